@@ -1,0 +1,73 @@
+# The only CMake functions of the project. A room is one folder and one static library; a program is a house's
+# main.cpp with its rooms; a check is one test binary. Names of targets follow the folders: services/kinematics/core
+# is the target `kinematics_core`, services/platform/bus is `platform_bus`.
+
+find_package(Eigen3 REQUIRED)
+find_package(GTest REQUIRED)
+find_package(Threads REQUIRED)
+
+find_program(CCACHE ccache)
+if(CCACHE)
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${CCACHE})
+endif()
+
+set(LAMBDAJET_SANITIZE "" CACHE STRING "Sanitizers to build everything with, as in -fsanitize=…")
+if(LAMBDAJET_SANITIZE)
+  add_compile_options(-fsanitize=${LAMBDAJET_SANITIZE} -fno-omit-frame-pointer)
+  add_link_options(-fsanitize=${LAMBDAJET_SANITIZE})
+endif()
+
+# Every target of ours: warnings are errors; includes start at services/ and at the generated roots.
+function(lambdajet_own_code target)
+  target_compile_options(${target} PRIVATE -Wall -Wextra -Wshadow -Wnon-virtual-dtor -Werror)
+  target_include_directories(${target} PUBLIC ${CMAKE_SOURCE_DIR}/services)
+endfunction()
+
+# lambdajet_quiet_room(name SOURCES a.cpp … DEPS room …): computes; sees std, Eigen and other quiet rooms.
+function(lambdajet_quiet_room name)
+  cmake_parse_arguments(ROOM "" "" "SOURCES;DEPS" ${ARGN})
+  if(ROOM_SOURCES)
+    add_library(${name} STATIC ${ROOM_SOURCES})
+    lambdajet_own_code(${name})
+    target_link_libraries(${name} PUBLIC Eigen3::Eigen ${ROOM_DEPS})
+  else()
+    add_library(${name} INTERFACE)
+    target_include_directories(${name} INTERFACE ${CMAKE_SOURCE_DIR}/services)
+    target_link_libraries(${name} INTERFACE Eigen3::Eigen ${ROOM_DEPS})
+  endif()
+endfunction()
+
+# lambdajet_door(name SOURCES … DEPS …): translates between a wire and a core, or wraps one library (platform).
+function(lambdajet_door name)
+  cmake_parse_arguments(ROOM "" "" "SOURCES;DEPS" ${ARGN})
+  add_library(${name} STATIC ${ROOM_SOURCES})
+  lambdajet_own_code(${name})
+  target_link_libraries(${name} PUBLIC ${ROOM_DEPS})
+endfunction()
+
+# lambdajet_program(name SOURCES main.cpp DEPS …): one process; lands in <build>/bin.
+function(lambdajet_program name)
+  cmake_parse_arguments(PROGRAM "" "" "SOURCES;DEPS" ${ARGN})
+  add_executable(${name}_program ${PROGRAM_SOURCES})
+  lambdajet_own_code(${name}_program)
+  target_link_libraries(${name}_program PRIVATE ${PROGRAM_DEPS})
+  set_target_properties(${name}_program PROPERTIES OUTPUT_NAME ${name} RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin)
+endfunction()
+
+# lambdajet_check(name LABELS unit SOURCES … DEPS … [TIMEOUT s] [SERIAL]): one GoogleTest binary, one ctest entry.
+function(lambdajet_check name)
+  cmake_parse_arguments(CHECK "SERIAL" "TIMEOUT" "SOURCES;DEPS;LABELS;ENVIRONMENT" ${ARGN})
+  add_executable(${name} ${CHECK_SOURCES})
+  lambdajet_own_code(${name})
+  target_include_directories(${name} PRIVATE ${CMAKE_SOURCE_DIR})
+  target_link_libraries(${name} PRIVATE GTest::gmock GTest::gtest_main ${CHECK_DEPS})
+  add_test(NAME ${name} COMMAND ${name})
+  if(NOT CHECK_TIMEOUT)
+    set(CHECK_TIMEOUT 120)
+  endif()
+  set_tests_properties(${name} PROPERTIES LABELS "${CHECK_LABELS}" TIMEOUT ${CHECK_TIMEOUT}
+    ENVIRONMENT "LAMBDAJET_SOURCE_DIR=${CMAKE_SOURCE_DIR};LAMBDAJET_BIN_DIR=${CMAKE_BINARY_DIR}/bin;${CHECK_ENVIRONMENT}")
+  if(CHECK_SERIAL)
+    set_tests_properties(${name} PROPERTIES RUN_SERIAL TRUE)
+  endif()
+endfunction()
