@@ -5,6 +5,18 @@
 find_package(Eigen3 REQUIRED)
 find_package(GTest REQUIRED)
 find_package(Threads REQUIRED)
+# Here, at the root's scope, because imported targets are seen only in and below the folder that finds them.
+find_package(absl REQUIRED)
+find_package(Protobuf REQUIRED)
+find_package(gRPC CONFIG REQUIRED)
+find_package(fastcdr REQUIRED)
+find_package(fastrtps REQUIRED)
+find_package(prometheus-cpp CONFIG REQUIRED)
+find_package(spdlog REQUIRED)
+find_package(yaml-cpp REQUIRED)
+find_package(nlohmann_json REQUIRED)
+find_package(OpenSSL REQUIRED)
+find_package(SQLite3 REQUIRED)
 
 find_program(CCACHE ccache)
 if(CCACHE)

@@ -1,0 +1,1 @@
+lambdajet_check(foundation_trouble_test LABELS unit SOURCES foundation_trouble_test.cpp DEPS foundation_trouble)
