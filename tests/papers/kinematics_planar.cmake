@@ -1,0 +1,1 @@
+lambdajet_check(papers_kinematics_planar LABELS papers SOURCES kinematics_planar_test.cpp DEPS kinematics_core)
