@@ -2,9 +2,9 @@
 //
 // Model: seed paper 000, (1) delta = sqrt(Db^2 + Dm^2 + Dn^2); (2) corrected: the skews act over a lever,
 //     Db = sqrt(dx1^2 + dx2^2 + dy1^2 + dy2^2 + (R_a sin alpha)^2 + (R_b sin beta)^2).
-// The printed (2) adds sin^2 of the angles, pure numbers, to mm^2. R_a is the distance of the cut from the turning point of
-// the drive module, R_b from that of the sheet on its rollers.
-// Units: mm, rad. Validity: any finite numbers. Threads: pure.
+// The printed (2) adds sin^2 of the angles, pure numbers, to mm^2. R_a is the distance of the cut from the
+// turning point of the drive module, R_b from that of the sheet on its rollers. Units: mm, rad. Validity: any
+// finite numbers. Threads: pure.
 #pragma once
 
 #include <array>

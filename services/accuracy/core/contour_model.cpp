@@ -56,7 +56,8 @@ void FillSteps(std::span<const PlanSample> samples, ContourModel& model) {
     const Eigen::Vector2d from = Acceleration(samples[i - 1]);
     const Eigen::Vector2d to = Acceleration(samples[i]);
     const double h = samples[i].tau_s - samples[i - 1].tau_s;
-    model.steps[i] = {h, 0.5 * (from + to), h > 0.0 ? Eigen::Vector2d((to - from) / h) : Eigen::Vector2d::Zero()};
+    model.steps[i] = {h, 0.5 * (from + to),
+                      h > 0.0 ? Eigen::Vector2d((to - from) / h) : Eigen::Vector2d::Zero()};
   }
 }
 
@@ -91,7 +92,8 @@ std::vector<Eigen::Vector2d> PlayFront(std::span<const PlanSample> samples, doub
   return front;
 }
 
-// How far to the left of the jet's path at sample i the front passes later; its tail at the end of a cut is judged across.
+// How far to the left of the jet's path at sample i the front passes later; its tail at the end of a cut is
+// judged across.
 double LagBias(std::span<const PlanSample> samples, const std::vector<Eigen::Vector2d>& front, std::size_t i,
                std::size_t end, const Eigen::Vector2d& n_W, double lag_time_s) {
   constexpr double kLagsUntilPassed = 8.0;
@@ -99,7 +101,8 @@ double LagBias(std::span<const PlanSample> samples, const std::vector<Eigen::Vec
   double best = INFINITY;
   Eigen::Vector2d nearest = front[i] - p;
   bool passed = false;
-  for (std::size_t k = i + 1; k < end && samples[k].tau_s - samples[i].tau_s <= kLagsUntilPassed * lag_time_s + 0.01; ++k) {
+  for (std::size_t k = i + 1;
+       k < end && samples[k].tau_s - samples[i].tau_s <= kLagsUntilPassed * lag_time_s + 0.01; ++k) {
     const Eigen::Vector2d a = front[k - 1] - p;
     const Eigen::Vector2d d = front[k] - front[k - 1];
     const double along = d.squaredNorm() > 0.0 ? std::clamp(-a.dot(d) / d.squaredNorm(), 0.0, 1.0) : 0.0;
@@ -121,8 +124,8 @@ struct Walk {
   std::size_t end_of_cut = 0;
 };
 
-bool AddPoint(std::span<const PlanSample> samples, const std::vector<Eigen::Vector2d>& front, std::size_t i, Walk& walk,
-              ContourModel& model) {
+bool AddPoint(std::span<const PlanSample> samples, const std::vector<Eigen::Vector2d>& front, std::size_t i,
+              Walk& walk, ContourModel& model) {
   ContourModel::Point point;
   point.p_W_mm = Place(samples[i]);
   point.n_W = NormalAt(samples, i);
@@ -143,7 +146,8 @@ bool AddPoint(std::span<const PlanSample> samples, const std::vector<Eigen::Vect
 }
 
 // Points at equal distances of cut length. False with the line where the mechanism cannot stand.
-bool FillPoints(std::span<const PlanSample> samples, double spacing_mm, ContourModel& model, std::uint32_t& blame_line) {
+bool FillPoints(std::span<const PlanSample> samples, double spacing_mm, ContourModel& model,
+                std::uint32_t& blame_line) {
   const auto front = PlayFront(samples, model.chain.jet_lag_time_s);
   Walk walk{spacing_mm};
   for (std::size_t i = 1; i < samples.size(); ++i) {
@@ -165,18 +169,21 @@ bool FillPoints(std::span<const PlanSample> samples, double spacing_mm, ContourM
   return true;
 }
 
-// Of a covariance scaled to unit diagonal, so that mm^2 and s^4 are factored alike; null directions stay null.
+// Of a covariance scaled to unit diagonal, so that mm^2 and s^4 are factored alike; null directions stay
+// null.
 ParameterCovariance SquareRoot(const ParameterCovariance& covariance) {
   const ParameterVector sigma = covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
   const ParameterVector scale = (sigma.array() > 0.0).select(sigma.cwiseInverse(), 0.0);
-  const Eigen::SelfAdjointEigenSolver<ParameterCovariance> solver(scale.asDiagonal() * covariance * scale.asDiagonal());
-  return sigma.asDiagonal() * solver.eigenvectors() * solver.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<ParameterCovariance> solver(scale.asDiagonal() * covariance *
+                                                                  scale.asDiagonal());
+  return sigma.asDiagonal() * solver.eigenvectors() *
+         solver.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
 }
 
 }  // namespace
 
-PredictionReason BuildContourModel(std::span<const PlanSample> samples, bool compensated, int points, ContourModel& model,
-                                   std::uint32_t& blame_line) {
+PredictionReason BuildContourModel(std::span<const PlanSample> samples, bool compensated, int points,
+                                   ContourModel& model, std::uint32_t& blame_line) {
   const PredictionReason reason = Judge(samples, blame_line);
   if (reason != PredictionReason::kPredicted) {
     return reason;
@@ -189,7 +196,8 @@ PredictionReason BuildContourModel(std::span<const PlanSample> samples, bool com
   model.spread = SquareRoot(model.chain.covariance);
   FillSteps(samples, model);
   const double spacing = 0.999999 * length / std::max(1, points);
-  return FillPoints(samples, spacing, model, blame_line) ? PredictionReason::kPredicted : PredictionReason::kUnreachable;
+  return FillPoints(samples, spacing, model, blame_line) ? PredictionReason::kPredicted
+                                                         : PredictionReason::kUnreachable;
 }
 
 void PlaySpring(const ContourModel& model, double elastic_lag_s2, double damping_time_s,

@@ -1,7 +1,8 @@
-// Draws random numbers by counting: the n-th number of a stream is a function of (seed, stream, n) and of nothing else.
+// Draws random numbers by counting: the n-th number of a stream is a function of (seed, stream, n) and of
+// nothing else.
 //
-// Model: SplitMix64's finaliser over the mixed counter, Box-Muller for the normal. A Monte Carlo draw is one stream, so the
-// result does not depend on the order or the number of threads in which draws are made.
+// Model: SplitMix64's finaliser over the mixed counter, Box-Muller for the normal. A Monte Carlo draw is one
+// stream, so the result does not depend on the order or the number of threads in which draws are made.
 // Threads: pure functions. Cost: some 5 ns a uniform, 30 ns a normal; no allocation.
 #pragma once
 
@@ -20,7 +21,8 @@ inline std::uint64_t MixCounter(std::uint64_t z) {
 
 class CounterStream {
  public:
-  CounterStream(std::uint64_t seed, std::uint64_t stream) : key_(MixCounter(MixCounter(seed) ^ (stream << 1 | 1))) {}
+  CounterStream(std::uint64_t seed, std::uint64_t stream)
+      : key_(MixCounter(MixCounter(seed) ^ (stream << 1 | 1))) {}
 
   // In (0, 1), never an end point.
   double Uniform(std::uint64_t n) const {

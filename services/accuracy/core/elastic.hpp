@@ -1,10 +1,10 @@
 // Bends the levers: what acceleration does to a mass that hangs on a spring at the tool.
 //
-// Model: seed paper 000, elastic error delta = F/k; lumped, m u'' + c u' + k u = -m a(t), written with the elastic lag
-// L = m/k and the damping time C = c/k as L u'' + C u' + u = -L a. Quasi-static |u| = m a/k; a step of a overshoots by
-// exp(-pi z/sqrt(1 - z^2)). If a stiffness is given per drive, the compliance at the tool is inv(k J^T J).
-// Units: mm, s, kg, N; 1 kg mm/s^2 = 1e-3 N. Threads: pure; a response is its owner's. Cost: a step some 10 ns, a change of
-// step length one exponential more; no allocation.
+// Model: seed paper 000, elastic error delta = F/k; lumped, m u'' + c u' + k u = -m a(t), written with the
+// elastic lag L = m/k and the damping time C = c/k as L u'' + C u' + u = -L a. Quasi-static |u| = m a/k; a
+// step of a overshoots by exp(-pi z/sqrt(1 - z^2)). If a stiffness is given per drive, the compliance at the
+// tool is inv(k J^T J). Units: mm, s, kg, N; 1 kg mm/s^2 = 1e-3 N. Threads: pure; a response is its owner's.
+// Cost: a step some 10 ns, a change of step length one exponential more; no allocation.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,18 +15,25 @@
 
 namespace lambdajet::accuracy {
 
-inline double InertiaForceN(double mass_kg, double acceleration_mm_per_s2) { return 1e-3 * mass_kg * acceleration_mm_per_s2; }
+inline double InertiaForceN(double mass_kg, double acceleration_mm_per_s2) {
+  return 1e-3 * mass_kg * acceleration_mm_per_s2;
+}
 
-inline double StaticDeflectionMm(double force_n, double stiffness_n_per_mm) { return force_n / stiffness_n_per_mm; }
+inline double StaticDeflectionMm(double force_n, double stiffness_n_per_mm) {
+  return force_n / stiffness_n_per_mm;
+}
 
-inline double NaturalFrequencyHz(double elastic_lag_s2) { return 1.0 / (2.0 * std::numbers::pi * std::sqrt(elastic_lag_s2)); }
+inline double NaturalFrequencyHz(double elastic_lag_s2) {
+  return 1.0 / (2.0 * std::numbers::pi * std::sqrt(elastic_lag_s2));
+}
 
 // Damping ratio z of elastic lag L and damping time C.
 inline double DampingRatio(double elastic_lag_s2, double damping_time_s) {
   return 0.5 * damping_time_s / std::sqrt(elastic_lag_s2);
 }
 
-// Peak over final value of the response to a step of acceleration: 2 without damping, 1 from critical damping on.
+// Peak over final value of the response to a step of acceleration: 2 without damping, 1 from critical damping
+// on.
 inline double StepPeakFactor(double damping_ratio) {
   if (damping_ratio >= 1.0) {
     return 1.0;
@@ -42,7 +49,8 @@ inline Eigen::Matrix2d ToolCompliance(const Eigen::Matrix2d& J_q_x, double drive
 // Plays L d'' + C d' + d = f(t) exactly for an f that is constant over each step.
 class SpringResponse {
  public:
-  SpringResponse(double elastic_lag_s2, double damping_time_s) : lag_(elastic_lag_s2), damping_(damping_time_s) {}
+  SpringResponse(double elastic_lag_s2, double damping_time_s)
+      : lag_(elastic_lag_s2), damping_(damping_time_s) {}
 
   const Eigen::Vector2d& deflection() const { return d_; }
 

@@ -7,8 +7,9 @@
 namespace lambdajet::accuracy {
 namespace {
 
-constexpr std::array<std::string_view, kSourceCount> kSourceNames = {
-    "BASE", "SHEET", "MECHANISM", "ELASTIC", "FOLLOWING", "STRAIGHTNESS", "BACKLASH", "JET_WANDER", "JET_LAG"};
+constexpr std::array<std::string_view, kSourceCount> kSourceNames = {"BASE",     "SHEET",      "MECHANISM",
+                                                                     "ELASTIC",  "FOLLOWING",  "STRAIGHTNESS",
+                                                                     "BACKLASH", "JET_WANDER", "JET_LAG"};
 
 constexpr Eigen::Index Index(Parameter p) { return static_cast<Eigen::Index>(p); }
 
@@ -24,7 +25,8 @@ double& At(std::array<double, kSourceCount>& values, Source source) {
 }  // namespace
 
 std::string_view SourceName(Source source) {
-  return source < Source::kCount ? kSourceNames[static_cast<std::size_t>(source)] : std::string_view("UNKNOWN");
+  return source < Source::kCount ? kSourceNames[static_cast<std::size_t>(source)]
+                                 : std::string_view("UNKNOWN");
 }
 
 Source SourceOf(Parameter parameter) {
@@ -99,7 +101,8 @@ ContourError ContourErrorAt(const ErrorChain& chain, const JetMotion& motion, bo
     return error;
   }
   const double speed = motion.v_W_mm_per_s.norm();
-  const Eigen::Vector2d t = speed > 0.0 ? Eigen::Vector2d(motion.v_W_mm_per_s / speed) : Eigen::Vector2d(0.0, -1.0);
+  const Eigen::Vector2d t =
+      speed > 0.0 ? Eigen::Vector2d(motion.v_W_mm_per_s / speed) : Eigen::Vector2d(0.0, -1.0);
   const Eigen::Vector2d n(-t.y(), t.x());
   const double a_n = n.dot(motion.a_W_mm_per_s2);
   SensitivityRow row = n.transpose() * place.J_p_parameters;

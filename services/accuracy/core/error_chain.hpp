@@ -1,17 +1,18 @@
-// Propagates what is not known of a machine to where the jet meets the sheet: sensitivities, and the contour error of one
-// point of a motion.
+// Propagates what is not known of a machine to where the jet meets the sheet: sensitivities, and the contour
+// error of one point of a motion.
 //
-// Model: the sheet's point under the jet is p_WJ = R_EW^T (p_DJ - p_DE(q) - p_EW) (frames.md); first order in every
-// parameter with the slider readings held. Along the contour's normal n, with acceleration a_n on the side of n:
-//     elastic   bias -(m/k) a_n, gone if compensated; sensitivity to m/k: -a_n either way (seed paper 000, delta = m a/k)
-//     jet lag   bias +T^2 a_n/2, to the inside (core/jet_lag.hpp)
-//     following slider i lags by f_i q_i'/feed, f_i of sigma following_mm; backlash +-width/2 by the sign of q_i'
-//     straightness of rail i acts like its offset; jet wander as it is
-// The quasi-static elastic bias stands for the peak of a jerk-limited motion; core/prediction.hpp plays the spring instead.
-// Frames: everything in W but the sliders. Units: mm, s, rad; variances mm^2.
-// Shapes: a sensitivity row is ordered as foundation's Parameter.
-// Threads: an ErrorChain is immutable once built. Cost: ContourErrorAt below 1 us, no allocation.
-// Errors: `valid` false where the mechanism cannot stand or cannot be differentiated.
+// Model: the sheet's point under the jet is p_WJ = R_EW^T (p_DJ - p_DE(q) - p_EW) (frames.md); first order in
+// every parameter with the slider readings held. Along the contour's normal n, with acceleration a_n on the
+// side of n:
+//     elastic   bias -(m/k) a_n, gone if compensated; sensitivity to m/k: -a_n either way (seed paper 000,
+//     delta = m a/k) jet lag   bias +T^2 a_n/2, to the inside (core/jet_lag.hpp) following slider i lags by
+//     f_i q_i'/feed, f_i of sigma following_mm; backlash +-width/2 by the sign of q_i' straightness of rail i
+//     acts like its offset; jet wander as it is
+// The quasi-static elastic bias stands for the peak of a jerk-limited motion; core/prediction.hpp plays the
+// spring instead. Frames: everything in W but the sliders. Units: mm, s, rad; variances mm^2. Shapes: a
+// sensitivity row is ordered as foundation's Parameter. Threads: an ErrorChain is immutable once built. Cost:
+// ContourErrorAt below 1 us, no allocation. Errors: `valid` false where the mechanism cannot stand or cannot
+// be differentiated.
 #pragma once
 
 #include <Eigen/Core>
@@ -26,13 +27,23 @@ namespace lambdajet::accuracy {
 
 // Where contour error comes from; the order is the wire's names' only.
 enum class Source : std::uint8_t {
-  kBase, kSheet, kMechanism, kElastic, kFollowing, kStraightness, kBacklash, kJetWander, kJetLag, kCount
+  kBase,
+  kSheet,
+  kMechanism,
+  kElastic,
+  kFollowing,
+  kStraightness,
+  kBacklash,
+  kJetWander,
+  kJetLag,
+  kCount
 };
 inline constexpr std::size_t kSourceCount = static_cast<std::size_t>(Source::kCount);
 
 // UPPER_SNAKE.
 std::string_view SourceName(Source source);
-// The source that a parameter belongs to. The camera's place moves no cut; it counts to the base that was found with it.
+// The source that a parameter belongs to. The camera's place moves no cut; it counts to the base that was
+// found with it.
 Source SourceOf(Parameter parameter);
 
 using SensitivityMatrix = Eigen::Matrix<double, 2, static_cast<int>(kParameterCount)>;
@@ -57,11 +68,12 @@ struct JetMotion {
 
 struct ContourError {
   bool valid = false;
-  double bias_mm = 0.0;      // signed, along the normal to the left of the motion
+  double bias_mm = 0.0;  // signed, along the normal to the left of the motion
   double sigma_mm = 0.0;
   double bound_95_mm = 0.0;  // |error| stays below with 95 %
   std::array<double, kSourceCount> bias_by_source_mm{};
-  std::array<double, kSourceCount> variance_by_source_mm2{};  // shares by covariance: they sum to sigma^2, one may be negative
+  std::array<double, kSourceCount>
+      variance_by_source_mm2{};  // shares by covariance: they sum to sigma^2, one may be negative
 };
 
 // A machine made ready for propagation.

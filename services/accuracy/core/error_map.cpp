@@ -49,7 +49,8 @@ PlaceError PlaceErrorAt(const ErrorChain& chain, const Eigen::Vector2d& p_W_mm, 
 
 std::vector<PlaceError> MapErrors(const MachineDescription& machine, const ErrorMapOptions& options) {
   const ErrorChain chain(machine);
-  const double mean = options.compensated ? 0.0 : chain.elastic_lag_s2 * std::abs(options.acceleration_mm_per_s2);
+  const double mean =
+      options.compensated ? 0.0 : chain.elastic_lag_s2 * std::abs(options.acceleration_mm_per_s2);
   std::vector<PlaceError> map;
   for (const Eigen::Vector2d& p_W : Grid(machine, options)) {
     map.push_back(PlaceErrorAt(chain, p_W, mean));
@@ -57,7 +58,8 @@ std::vector<PlaceError> MapErrors(const MachineDescription& machine, const Error
   return map;
 }
 
-std::vector<ParameterShare> RankParameters(const MachineDescription& machine, const ErrorMapOptions& options) {
+std::vector<ParameterShare> RankParameters(const MachineDescription& machine,
+                                           const ErrorMapOptions& options) {
   const ErrorChain chain(machine);
   ParameterVector squares = ParameterVector::Zero();
   int places = 0;

@@ -1,10 +1,11 @@
-// Cuts corners: the front of the cut trails the jet, so arcs come out smaller and corners rounder than the jet's path.
+// Cuts corners: the front of the cut trails the jet, so arcs come out smaller and corners rounder than the
+// jet's path.
 //
-// Model: first-order lag T f' + f = p of the cut front f behind the jet p. On a circle of radius R at speed v the front runs
-// on R/sqrt(1 + (v T/R)^2); in general the cut lies towards the inside by T^2 a_n/2 to second order. Through a sharp
-// corner of turning angle phi at constant speed the front leaves the first edge at the corner and nears the second as
-// exp(-t/T); it passes the corner point itself at a distance below v T.
-// Units: mm, s, rad. Validity: T >= 0, v >= 0, R > 0. Threads: pure.
+// Model: first-order lag T f' + f = p of the cut front f behind the jet p. On a circle of radius R at speed v
+// the front runs on R/sqrt(1 + (v T/R)^2); in general the cut lies towards the inside by T^2 a_n/2 to second
+// order. Through a sharp corner of turning angle phi at constant speed the front leaves the first edge at the
+// corner and nears the second as exp(-t/T); it passes the corner point itself at a distance below v T. Units:
+// mm, s, rad. Validity: T >= 0, v >= 0, R > 0. Threads: pure.
 #pragma once
 
 #include <Eigen/Core>
@@ -63,7 +64,8 @@ class CutFront {
     }
     const double ratio = step_s / lag_time_s_;
     const double decay = std::exp(-ratio);
-    const Eigen::Vector2d trail = (jet_mm - jet_) / ratio;  // v T, where the front would settle behind the jet
+    const Eigen::Vector2d trail =
+        (jet_mm - jet_) / ratio;  // v T, where the front would settle behind the jet
     front_ = jet_mm - trail + decay * (front_ - jet_ + trail);
     jet_ = jet_mm;
   }

@@ -48,8 +48,8 @@ Spread AxisDeviation(const JetStack& stack) {
   }
   const double longest = std::max({r.a, r.b, r.e});
   const double rest = r.a + r.b + r.e - longest;
-  return {sum / (kAzimuths * kAzimuths), std::sqrt(r.a * r.a + r.b * r.b + r.e * r.e), std::max(0.0, longest - rest),
-          longest + rest};
+  return {sum / (kAzimuths * kAzimuths), std::sqrt(r.a * r.a + r.b * r.b + r.e * r.e),
+          std::max(0.0, longest - rest), longest + rest};
 }
 
 Spread EdgeDeviation(const JetStack& stack, const BoreRadius& bore, std::uint64_t seed, int draws) {

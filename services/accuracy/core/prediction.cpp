@@ -22,13 +22,15 @@ Deflections Spring(const ContourModel& model, double elastic_lag_s2, double damp
   return d;
 }
 
-// Central difference of the spring's part in one of its two numbers; one-sided where that would become negative.
+// Central difference of the spring's part in one of its two numbers; one-sided where that would become
+// negative.
 Deflections SpringSlope(const ContourModel& model, double lag_step_s2, double damping_step_s) {
   const double lag = model.chain.elastic_lag_s2;
   const double damping = model.chain.damping_time_s;
   const bool centred = lag >= lag_step_s2 && damping >= damping_step_s;
   const Deflections above = Spring(model, lag + lag_step_s2, damping + damping_step_s);
-  const Deflections below = centred ? Spring(model, lag - lag_step_s2, damping - damping_step_s) : Spring(model, lag, damping);
+  const Deflections below =
+      centred ? Spring(model, lag - lag_step_s2, damping - damping_step_s) : Spring(model, lag, damping);
   const double width = (centred ? 2.0 : 1.0) * (lag_step_s2 + damping_step_s);
   Deflections slope(above.size());
   for (std::size_t i = 0; i < above.size(); ++i) {
@@ -85,8 +87,8 @@ Source Dominant(const PointErrors& errors, std::size_t point) {
   return static_cast<Source>(best);
 }
 
-void FillPointBounds(const ContourModel& model, const PointErrors& errors, std::span<const PlanSample> samples,
-                     ContourPrediction& prediction) {
+void FillPointBounds(const ContourModel& model, const PointErrors& errors,
+                     std::span<const PlanSample> samples, ContourPrediction& prediction) {
   for (std::size_t i = 0; i < model.points.size(); ++i) {
     const ContourModel::Point& from = model.points[i];
     const PlanSample& sample = samples[from.sample];
@@ -128,7 +130,8 @@ std::vector<SourceShare> RankSources(const ContourModel& model, const PointError
     share.contribution_95_mm = ContourPercentile(
         model,
         [&errors, s](std::size_t i) {
-          return FoldedNormalQuantile(errors.bias_mm[i][s], std::sqrt(std::max(0.0, errors.variance_mm2[i][s])), 0.95);
+          return FoldedNormalQuantile(errors.bias_mm[i][s],
+                                      std::sqrt(std::max(0.0, errors.variance_mm2[i][s])), 0.95);
         },
         0.95);
     budget.push_back(share);
@@ -154,7 +157,8 @@ std::vector<PredictedPoint> WorstPlaces(const std::vector<PredictedPoint>& point
   return worst;
 }
 
-std::vector<FeaturePrediction> ListFeatures(const ContourModel& model, const std::vector<PredictedPoint>& points) {
+std::vector<FeaturePrediction> ListFeatures(const ContourModel& model,
+                                            const std::vector<PredictedPoint>& points) {
   std::vector<FeaturePrediction> features(model.features);
   for (std::size_t i = 0; i < points.size(); ++i) {
     FeaturePrediction& f = features[points[i].feature];
@@ -210,8 +214,16 @@ void Sample(const ContourModel& model, const PredictionOptions& options, Contour
 
 // Numbers of a draw's stream that belong to one cut; the points' own follow.
 enum Drawn : std::uint64_t {
-  kFollowing1 = kParameterCount, kFollowing2, kBacklash1, kBacklash2,
-  kRail1Sine, kRail1Cosine, kRail2Sine, kRail2Cosine, kLag, kFirstPoint = 40
+  kFollowing1 = kParameterCount,
+  kFollowing2,
+  kBacklash1,
+  kBacklash2,
+  kRail1Sine,
+  kRail1Cosine,
+  kRail2Sine,
+  kRail2Cosine,
+  kLag,
+  kFirstPoint = 40
 };
 
 // One machine out of the many that the description allows.
@@ -221,11 +233,11 @@ struct DrawnMachine {
   PlanarPose X_DJ;
   Eigen::Vector2d p_EW_mm;
   Eigen::Matrix2d R_WE;
-  Eigen::Array2d following;   // slider error by slider rate, s
-  Eigen::Array2d backlash_mm; // half width
+  Eigen::Array2d following;    // slider error by slider rate, s
+  Eigen::Array2d backlash_mm;  // half width
   Eigen::Array2d sine_mm;
   Eigen::Array2d cosine_mm;
-  double lag_factor;          // on the lag's inset, which goes with the square of its time
+  double lag_factor;  // on the lag's inset, which goes with the square of its time
 };
 
 DrawnMachine DrawMachine(const ContourModel& model, const CounterStream& random) {
@@ -250,7 +262,8 @@ DrawnMachine DrawMachine(const ContourModel& model, const CounterStream& random)
   return m;
 }
 
-// Deviation from the parameters, the mechanism solved exactly; by first order where the drawn machine cannot stand there.
+// Deviation from the parameters, the mechanism solved exactly; by first order where the drawn machine cannot
+// stand there.
 double ParameterDeviation(const ErrorChain& chain, const DrawnMachine& m, const ContourModel::Point& point) {
   const auto forward = kinematics::SolveForward(m.mechanism, point.actuator_position_mm);
   if (!forward.positioned) {
@@ -271,7 +284,7 @@ double SliderDeviation(const DrawnMachine& m, const ContourModel::Point& point) 
 }  // namespace
 
 std::string_view Name(PredictionReason reason) {
-  constexpr std::array<std::string_view, 6> kNames = {"UNKNOWN",      "PREDICTED",   "NO_CUTTING",
+  constexpr std::array<std::string_view, 6> kNames = {"UNKNOWN",    "PREDICTED",    "NO_CUTTING",
                                                       "NOT_FINITE", "OUT_OF_ORDER", "UNREACHABLE"};
   const auto i = static_cast<std::size_t>(reason);
   return i < kNames.size() ? kNames[i] : kNames[0];
@@ -297,7 +310,9 @@ double WeightedPercentile(std::vector<WeightedValue>& values, double fraction) {
 }
 
 DrawSpace::DrawSpace(const ContourModel& model)
-    : spring_W_mm(model.points.size(), Eigen::Vector2d::Zero()), by_feature(model.features), feature_p95_mm(model.features) {
+    : spring_W_mm(model.points.size(), Eigen::Vector2d::Zero()),
+      by_feature(model.features),
+      feature_p95_mm(model.features) {
   all.reserve(model.points.size());
   std::vector<std::size_t> count(model.features);
   for (const ContourModel::Point& point : model.points) {
@@ -311,16 +326,17 @@ DrawSpace::DrawSpace(const ContourModel& model)
 double DrawContour(const ContourModel& model, std::uint64_t seed, std::uint64_t draw, DrawSpace& space) {
   const CounterStream random(seed, draw);
   const DrawnMachine machine = DrawMachine(model, random);
-  PlaySpring(model, machine.parameters[Index(Parameter::kElasticLagS2)], machine.parameters[Index(Parameter::kDampingTimeS)],
-             space.spring_W_mm);
+  PlaySpring(model, machine.parameters[Index(Parameter::kElasticLagS2)],
+             machine.parameters[Index(Parameter::kDampingTimeS)], space.spring_W_mm);
   space.all.clear();
   for (auto& values : space.by_feature) {
     values.clear();
   }
   for (std::size_t i = 0; i < model.points.size(); ++i) {
     const ContourModel::Point& point = model.points[i];
-    const double deviation = ParameterDeviation(model.chain, machine, point) + SliderDeviation(machine, point) +
-                             point.n_W.dot(space.spring_W_mm[i]) + machine.lag_factor * point.lag_bias_mm +
+    const double deviation = ParameterDeviation(model.chain, machine, point) +
+                             SliderDeviation(machine, point) + point.n_W.dot(space.spring_W_mm[i]) +
+                             machine.lag_factor * point.lag_bias_mm +
                              model.chain.uncertainties.jet_wander_mm * random.Normal(kFirstPoint + i);
     space.all.push_back({std::abs(deviation), point.weight_mm});
     space.by_feature[point.feature].push_back(space.all.back());
@@ -331,8 +347,8 @@ double DrawContour(const ContourModel& model, std::uint64_t seed, std::uint64_t 
   return WeightedPercentile(space.all, 0.95);
 }
 
-ContourPrediction Predict(const MachineDescription& machine, std::span<const PlanSample> samples, bool compensated,
-                          const PredictionOptions& options) {
+ContourPrediction Predict(const MachineDescription& machine, std::span<const PlanSample> samples,
+                          bool compensated, const PredictionOptions& options) {
   ContourPrediction prediction;
   ContourModel model(machine);
   prediction.reason = BuildContourModel(samples, compensated, options.points, model, prediction.blame_line);
@@ -342,16 +358,20 @@ ContourPrediction Predict(const MachineDescription& machine, std::span<const Pla
   const PointErrors errors = PropagateLinearly(model);
   FillPointBounds(model, errors, samples, prediction);
   const std::vector<PredictedPoint>& points = prediction.points;
-  prediction.predicted_95_linear_mm = ContourPercentile(model, [&points](std::size_t i) { return points[i].bound_95_mm; }, 0.95);
+  prediction.predicted_95_linear_mm = ContourPercentile(
+      model, [&points](std::size_t i) { return points[i].bound_95_mm; }, 0.95);
   prediction.predicted_95_mm = prediction.predicted_95_linear_mm;
   prediction.expected_95_mm = ContourPercentile(
-      model, [&points](std::size_t i) { return FoldedNormalQuantile(points[i].bias_mm, points[i].sigma_mm, 0.5); }, 0.95);
+      model,
+      [&points](std::size_t i) { return FoldedNormalQuantile(points[i].bias_mm, points[i].sigma_mm, 0.5); },
+      0.95);
   prediction.budget = RankSources(model, errors);
   prediction.worst = WorstPlaces(points);
   prediction.features = ListFeatures(model, points);
   for (FeaturePrediction& f : prediction.features) {
     for (const PredictedPoint& point : points) {
-      f.predicted_95_mm = point.feature == f.feature ? std::max(f.predicted_95_mm, point.bound_95_mm) : f.predicted_95_mm;
+      f.predicted_95_mm =
+          point.feature == f.feature ? std::max(f.predicted_95_mm, point.bound_95_mm) : f.predicted_95_mm;
     }
   }
   Sample(model, options, prediction);

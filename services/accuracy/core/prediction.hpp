@@ -1,18 +1,20 @@
 // Predicts how far from the drawing a planned cut will be, before it is cut.
 //
-// Model: the deviation of the cut contour along its normal is a bias and a spread from nine sources (core/error_chain.hpp).
-// What is constant for a machine (parameters, slider lags, backlash, rail waves) is drawn once a cut and is fully correlated
-// along the contour; jet wander is drawn at each point. The spring is played over the whole plan with
-// L d'' + C d' + d = -L a, or, compensated, (L0 - L) a + (C - C0) L0 a' with L0, C0 the believed values; the cut front is
-// played behind the jet and its distance to the jet's path taken.
+// Model: the deviation of the cut contour along its normal is a bias and a spread from nine sources
+// (core/error_chain.hpp). What is constant for a machine (parameters, slider lags, backlash, rail waves) is
+// drawn once a cut and is fully correlated along the contour; jet wander is drawn at each point. The spring
+// is played over the whole plan with L d'' + C d' + d = -L a, or, compensated, (L0 - L) a + (C - C0) L0 a'
+// with L0, C0 the believed values; the cut front is played behind the jet and its distance to the jet's path
+// taken.
 //     linear       per point bias, sigma and 95 % of |N(bias, sigma)|; the contour's 95th percentile of these
-//     Monte Carlo  each draw is a whole machine, its mechanism solved exactly; its result is the contour's 95th percentile
-// Rail waves are sines of kRailWaveLengthMm with drawn amplitude and phase (a choice; their source gives a sigma only).
-// Not in it: the corners that the planner rounds within its tolerance.
-// Frames: W. Units: mm, s. Shapes: samples in order of tau; points at equal distances along the cut length, at most
+//     Monte Carlo  each draw is a whole machine, its mechanism solved exactly; its result is the contour's
+//     95th percentile
+// Rail waves are sines of kRailWaveLengthMm with drawn amplitude and phase (a choice; their source gives a
+// sigma only). Not in it: the corners that the planner rounds within its tolerance. Frames: W. Units: mm, s.
+// Shapes: samples in order of tau; points at equal distances along the cut length, at most
 // PredictionOptions::points.
-// Threads: pure; draws may be made in any order and split (DrawContour). Cost: 400 draws of 600 points and 15,000 samples
-// about 0.5 s. Errors: an answer with a Reason of its own.
+// Threads: pure; draws may be made in any order and split (DrawContour). Cost: 400 draws of 600 points and
+// 15,000 samples about 0.5 s. Errors: an answer with a Reason of its own.
 #pragma once
 
 #include <Eigen/Core>
@@ -31,18 +33,18 @@ inline constexpr double kRailWaveLengthMm = 400.0;
 inline constexpr int kMostDraws = 100000;
 
 struct PredictionOptions {
-  int draws = 400;         // 0: linear only
+  int draws = 400;  // 0: linear only
   std::uint64_t seed = 1;
-  int points = 600;        // of the contour, at most
+  int points = 600;           // of the contour, at most
   double tolerance_mm = 0.0;  // for the probability of conformity; 0: not asked
 };
 
 enum class PredictionReason : std::uint8_t {
   kPredicted = 1,
-  kNoCutting = 2,       // no sample with the jet on moves
+  kNoCutting = 2,  // no sample with the jet on moves
   kNotFinite = 3,
-  kOutOfOrder = 4,      // tau goes back
-  kUnreachable = 5      // the mechanism cannot stand at `blame_line`
+  kOutOfOrder = 4,  // tau goes back
+  kUnreachable = 5  // the mechanism cannot stand at `blame_line`
 };
 std::string_view Name(PredictionReason reason);
 
@@ -51,8 +53,8 @@ struct PredictedPoint {
   double s_mm = 0.0;
   Eigen::Vector2d p_W_mm = Eigen::Vector2d::Zero();
   std::uint32_t source_line = 0;
-  std::uint32_t feature = 0;      // index of the cut: pierce to jet off
-  double bias_mm = 0.0;           // positive to the left of the motion
+  std::uint32_t feature = 0;  // index of the cut: pierce to jet off
+  double bias_mm = 0.0;       // positive to the left of the motion
   double sigma_mm = 0.0;
   double bound_95_mm = 0.0;
   Source dominant = Source::kBase;
@@ -70,19 +72,19 @@ struct FeaturePrediction {
   std::uint32_t last_line = 0;
   double length_mm = 0.0;
   double predicted_95_mm = 0.0;
-  double conformity = 0.0;          // probability that its 95th percentile is within tolerance_mm; 0 if not asked
+  double conformity = 0.0;  // probability that its 95th percentile is within tolerance_mm; 0 if not asked
 };
 
 struct ContourPrediction {
   PredictionReason reason = PredictionReason::kNotFinite;
   std::uint32_t blame_line = 0;
-  double predicted_95_mm = 0.0;         // Monte Carlo's, or linear's without draws
+  double predicted_95_mm = 0.0;  // Monte Carlo's, or linear's without draws
   double predicted_95_linear_mm = 0.0;
-  double expected_95_mm = 0.0;          // median over the draws; linear: the percentile of |bias| and sigma's median
+  double expected_95_mm = 0.0;  // median over the draws; linear: the percentile of |bias| and sigma's median
   double conformity = 0.0;
   std::vector<PredictedPoint> points;
-  std::vector<SourceShare> budget;      // ranked, largest first
-  std::vector<PredictedPoint> worst;    // at most 10, of different lines
+  std::vector<SourceShare> budget;    // ranked, largest first
+  std::vector<PredictedPoint> worst;  // at most 10, of different lines
   std::vector<FeaturePrediction> features;
 };
 
@@ -108,7 +110,7 @@ struct ContourModel {
   ErrorChain chain;
   ParameterCovariance spread;  // square root of the covariance
   bool compensated = false;
-  std::vector<Step> steps;     // steps[i] ends at sample i
+  std::vector<Step> steps;  // steps[i] ends at sample i
   std::vector<Point> points;
   std::uint32_t features = 0;
 
@@ -129,20 +131,20 @@ struct DrawSpace {
   std::vector<double> feature_p95_mm;  // of the last draw
 };
 
-// One machine drawn, cut, and measured: the 95th percentile of |deviation| over all points; per feature in `space`.
-// Cost: no allocation.
+// One machine drawn, cut, and measured: the 95th percentile of |deviation| over all points; per feature in
+// `space`. Cost: no allocation.
 double DrawContour(const ContourModel& model, std::uint64_t seed, std::uint64_t draw, DrawSpace& space);
 
 // Walks the plan. Leaves a model fit for DrawContour where the answer is kPredicted.
-PredictionReason BuildContourModel(std::span<const PlanSample> samples, bool compensated, int points, ContourModel& model,
-                                   std::uint32_t& blame_line);
+PredictionReason BuildContourModel(std::span<const PlanSample> samples, bool compensated, int points,
+                                   ContourModel& model, std::uint32_t& blame_line);
 
 // The spring's part of the deviation at each point, for a machine of the given elastic lag and damping time.
 void PlaySpring(const ContourModel& model, double elastic_lag_s2, double damping_time_s,
                 std::span<Eigen::Vector2d> deviation_W_mm);
 
-ContourPrediction Predict(const MachineDescription& machine, std::span<const PlanSample> samples, bool compensated,
-                          const PredictionOptions& options = {});
+ContourPrediction Predict(const MachineDescription& machine, std::span<const PlanSample> samples,
+                          bool compensated, const PredictionOptions& options = {});
 
 // The value below which `fraction` of the weight lies; 0 if there is none. Reorders.
 double WeightedPercentile(std::vector<WeightedValue>& values, double fraction);

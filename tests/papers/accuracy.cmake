@@ -1,0 +1,1 @@
+lambdajet_check(accuracy_papers_test LABELS papers SOURCES accuracy_papers_test.cpp DEPS accuracy_core)
