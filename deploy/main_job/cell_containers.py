@@ -1,0 +1,135 @@
+"""The cell as containers: builds the image once, brings deploy/compose.yaml up, and takes it down again."""
+
+import json
+import os
+import secrets
+import shutil
+import subprocess
+import time
+
+from cell_processes import SEVEN, START_ORDER, StartFailed
+
+BASE = os.environ.get("LAMBDAJET_CONTAINER_BASE", "localhost/debian:bookworm-slim")
+IMAGE = "localhost/lambdajet"
+ADDRESSES = {
+    "kinematics": "10.90.77.11:50051",
+    "calibration": "10.90.77.12:50052",
+    "trajectory": "10.90.77.13:50053",
+    "accuracy": "10.90.77.14:50054",
+    "cell": "10.90.77.15:50055",
+    "drive": "10.90.77.16:50056",
+    "main_motion": "10.90.77.17:50057",
+    "inspection": "10.90.77.18:50058",
+}
+USER = 65532
+
+
+class Containers:
+    """The same face as cell_processes.LocalProcesses."""
+
+    def __init__(self, source, run_folder, options):
+        self.source = source
+        self.folder = run_folder
+        self.options = options
+        self.environment = dict(
+            os.environ,
+            CONTAINERS_CONF=str(source / "deploy" / "containers.conf"),
+            LAMBDAJET_RUN=str(run_folder),
+            LAMBDAJET_MACHINE=str(options.machine),
+            LAMBDAJET_PLANT=str(options.plant),
+            LAMBDAJET_SEED=str(options.seed),
+        )
+        self.up = False
+
+    def call(self, *command, check=True):
+        done = subprocess.run(command, env=self.environment, cwd=self.source, stdin=subprocess.DEVNULL,
+                              stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        if check and done.returncode != 0:
+            tail = "\n".join(done.stdout.strip().splitlines()[-15:])
+            raise StartFailed(f"'{' '.join(command[:3])} …' ended with {done.returncode}:\n{tail}")
+        return done
+
+    def compose(self, *words, check=True):
+        return self.call("podman-compose", "-p", "lambdajet", "-f", str(self.source / "deploy" / "compose.yaml"), *words, check=check)
+
+    def make_base(self):
+        """A bare Debian 12 from its own packages, where no registry of images is to be had."""
+        if self.call("podman", "image", "exists", BASE, check=False).returncode == 0:
+            return
+        root = self.folder / "base"
+        print("  making the base image from Debian's packages (a minute)", flush=True)
+        self.call("debootstrap", "--variant=minbase", "bookworm", str(root))
+        # The host's way to Debian's packages, as an administrator would set it up in an image of the house.
+        for name in ("apt/sources.list.d/debian.sources", "apt/sources.list", "apt/apt.conf.d/99artifact-registry"):
+            if os.path.isfile(f"/etc/{name}"):
+                shutil.copy(f"/etc/{name}", root / "etc" / name)
+        archive = self.folder / "base.tar"
+        self.call("tar", "-C", str(root), "-cf", str(archive), ".")
+        self.call("podman", "import", str(archive), BASE)
+        shutil.rmtree(root)
+        archive.unlink()
+
+    def make_image(self):
+        cache = os.environ.get("CCACHE_DIR", os.path.expanduser("~/.cache/ccache"))
+        os.makedirs(cache, exist_ok=True)
+        print("  building the image (as long as a build, less what ccache holds)", flush=True)
+        self.call("buildah", "bud", "--isolation", "chroot", "--layers", "--build-arg", f"BASE={BASE}", "--volume", f"{cache}:/ccache",
+                  "--tag", IMAGE, "--file", "deploy/Containerfile", ".")
+
+    def start(self):
+        self.folder.mkdir(parents=True, exist_ok=True)
+        self.make_base()
+        self.make_image()
+        key = self.folder / "key"
+        key.write_text(f"1 {secrets.token_hex(32)}\n")
+        for path in (self.folder, key):
+            os.chown(path, USER, USER)
+        key.chmod(0o400)
+        self.compose("down", check=False)
+        started = time.monotonic()
+        self.up = True
+        self.compose("up", "-d")
+        return started
+
+    def addresses(self):
+        return dict(ADDRESSES)
+
+    def container(self, name):
+        return f"lambdajet_{name}_1"
+
+    def inspect(self):
+        """name -> (running, exit code, pid)."""
+        done = self.call("podman", "inspect", *[self.container(name) for name in START_ORDER], check=False)
+        try:
+            states = json.loads(done.stdout)
+        except ValueError:
+            return {}
+        return {name: (s["State"]["Running"], s["State"]["ExitCode"], s["State"]["Pid"]) for name, s in zip(START_ORDER, states)}
+
+    def check_alive(self):
+        for name, (running, code, _) in self.inspect().items():
+            if not running and code != 0:
+                raise StartFailed(f"{name} ended with exit code {code}: {self.last_words(name)}")
+
+    def last_words(self, name):
+        lines = self.call("podman", "logs", "--tail", "1", self.container(name), check=False).stdout.strip().splitlines()
+        return lines[-1] if lines else "it said nothing"
+
+    def resident_mib(self):
+        result = {}
+        for name, (_, _, pid) in self.inspect().items():
+            try:
+                with open(f"/proc/{pid}/status", encoding="ascii") as status:
+                    result[name] = next(int(line.split()[1]) / 1024.0 for line in status if line.startswith("VmRSS:"))
+            except (OSError, StopIteration):
+                continue
+        return {name: result[name] for name in SEVEN + ("inspection",) if name in result}
+
+    def stop(self):
+        if not self.up:
+            return
+        for name in START_ORDER:
+            log = self.call("podman", "logs", self.container(name), check=False).stdout
+            (self.folder / f"{name}.log").write_text(log)
+        self.compose("down", check=False)
+        self.up = False
