@@ -60,9 +60,8 @@ class Containers:
         print("  making the base image from Debian's packages (a minute)", flush=True)
         self.call("debootstrap", "--variant=minbase", "bookworm", str(root))
         # The host's way to Debian's packages, as an administrator would set it up in an image of the house.
-        for name in ("apt/sources.list.d/debian.sources", "apt/sources.list", "apt/apt.conf.d/99artifact-registry"):
-            if os.path.isfile(f"/etc/{name}"):
-                shutil.copy(f"/etc/{name}", root / "etc" / name)
+        for name in ("sources.list.d", "apt.conf.d"):
+            shutil.copytree(f"/etc/apt/{name}", root / "etc" / "apt" / name, dirs_exist_ok=True)
         archive = self.folder / "base.tar"
         self.call("tar", "-C", str(root), "-cf", str(archive), ".")
         self.call("podman", "import", str(archive), BASE)

@@ -47,9 +47,9 @@ def colour_of(deviation_mm, full_mm):
     return "#%02x%02x%02x" % tuple(round(a + (b - a) * mix) for a, b in zip(low, high))
 
 
-def part(name, deviations, magnification, full_mm):
-    """deviations: (x, y, deviation, feature) along the outlines. The cut edge is drawn off the drawing by
-    magnification * deviation along the outline's normal, coloured by |deviation|."""
+def part(name, deviations, holes, magnification, full_mm):
+    """deviations: (x, y, deviation, feature) along the outlines, positive where too much material is left; holes: the features
+    with material outside. The cut edge is drawn off the drawing by magnification * deviation, coloured by |deviation|."""
     outlines = {}
     for x, y, deviation, feature in deviations:
         outlines.setdefault(feature, []).append((x, y, deviation))
@@ -63,13 +63,19 @@ def part(name, deviations, magnification, full_mm):
         return margin + (x - min(xs)) * scale, height - margin - (y - min(ys)) * scale
 
     body = [_text(margin, 26, f"{name}: deviation drawn {magnification:g} times as large", 16, weight="bold")]
-    for line in outlines.values():
+    for feature, line in outlines.items():
         points = " ".join("%.1f,%.1f" % at(x, y) for x, y, _ in line + line[:1])
         body.append(f'<polyline points="{points}" fill="none" stroke="{GRID}" stroke-width="3"/>')
-        body += _deviation_strokes(line, at, magnification, full_mm)
+        body += _deviation_strokes(line, at, magnification * _away_from_material(line, feature in holes), full_mm)
     body += _colour_key(margin, height - 22, full_mm)
     body += _scale_bar(width - margin, height - 22, scale)
     return _svg(width, round(height), body)
+
+
+def _away_from_material(line, hole):
+    """+1 where the normal left of the outline's direction points away from the material, else -1."""
+    area = sum(a[0] * b[1] - b[0] * a[1] for a, b in zip(line, line[1:] + line[:1]))
+    return (1 if area > 0 else -1) * (1 if hole else -1)
 
 
 def _deviation_strokes(line, at, magnification, full_mm):
@@ -210,10 +216,11 @@ def histogram(title, values_mm, limits):
     for label, mm in limits:
         x = left + plot_width * mm * 1000 / edge
         body.append(f'<line x1="{x:.1f}" y1="44" x2="{x:.1f}" y2="{height - bottom}" stroke="#b3261e" stroke-dasharray="4 3"/>')
-        body.append(_text(x + 4, 54, label, 11, colour="#b3261e"))
+        late = x > width - 160
+        body.append(_text(x - 4 if late else x + 4, 54, label, 11, "end" if late else "start", "#b3261e"))
     step = nice_step(edge, 8)
     for i in range(int(edge / step) + 1):
         body.append(_text(left + plot_width * i * step / edge, height - bottom + 16, f"{i * step:g}", 11, anchor="middle"))
     body.append(_text(width - 20, height - 8, "|deviation| along the path, µm", 11, anchor="end"))
-    body.append(_text(8, 54, f"{tall} events", 11))
+    body.append(_text(8, 54, f"highest bar: {tall}", 11))
     return _svg(width, height, body)

@@ -3,6 +3,8 @@
 import html
 import json
 
+import yaml
+
 import pictures
 
 FULL_COLOUR_MM = 0.6
@@ -121,12 +123,18 @@ def write(run, folder):
     (folder / "report.html").write_text(as_html(run, drawn))
 
 
+def holes_of(run, stage):
+    """Indices of the stage's features that are holes in the drawing."""
+    holes = {f["name"] for f in yaml.safe_load(run.drawing)["features"] if f.get("kind") == "hole"}
+    return {i for i, feature in enumerate(stage.found.features) if feature.name in holes}
+
+
 def draw(run):
     drawn = {}
     for i, stage in enumerate(run.stages):
         deviations = rows(stage.found.deviations, 4)
         if deviations:
-            drawn[f"part_{i + 1}"] = pictures.part(stage.name, deviations, 10, FULL_COLOUR_MM)
+            drawn[f"part_{i + 1}"] = pictures.part(stage.name, deviations, holes_of(run, stage), 10, FULL_COLOUR_MM)
     drawn["budget"] = pictures.budget(
         [(s.name, [(share.source, share.contribution_95_mm) for share in s.prediction.budget]) for s in run.stages]
     )
