@@ -1,0 +1,1 @@
+lambdajet_check(papers_kinematics_service_area LABELS papers SOURCES kinematics_service_area_test.cpp DEPS kinematics_spatial)
