@@ -14,9 +14,10 @@
 // Frames: everything in D. Units: mm, rad. s1, s2: the working mode of foundation/machine.
 // Assembly mode: on a common rail the sign of the tool's distance from rail 1, in D's sense (the sign of y);
 // on rails set apart the side of the line from slider 1 to slider 2 (+1: left). Which of the two a mechanism
-// uses is fixed by RailsApart(). Shapes: the scalar S is double, std::complex<double> or a Ceres Jet;
-// branches are taken on the real part only. Validity: roots of negative numbers are taken as 0; the caller
-// asks `radicand` first. Cost: inverse two roots and no division; no allocation.
+// uses is fixed by RailsApart(). Shapes: the scalar S is double, std::complex<double>, a Ceres Jet or
+// lambda_lanes.hpp's pair of doubles; branches are taken on the real part only. Validity: roots of negative
+// numbers are taken as 0; the caller asks `radicand` first. Cost: inverse two roots and no division; no
+// allocation.
 #pragma once
 
 #include <cmath>
@@ -137,6 +138,13 @@ Readings<S> ReadingsOf(const Geometry<S>& g, const Closure<S>& k) {
   return {k.position_1_mm - g.rail_1.zero_mm, k.position_2_mm - g.rail_2.zero_mm};
 }
 
+// +1 or -1: on which side of the line from slider 1 to slider 2 the assembly mode puts the tool. On a common
+// rail the line is read in the rail's sense, whichever slider comes first.
+template <class S>
+double SideOf(const S& forward_mm, double assembly_mode, bool rails_apart) {
+  return !rails_apart && ValueOf(forward_mm) < 0.0 ? -assembly_mode : assembly_mode;
+}
+
 // The triangle slider 1, slider 2, attachment.
 template <class S>
 struct Assembly {
@@ -162,8 +170,8 @@ Assembly<S> Assemble(const Geometry<S>& g, const Readings<S>& q, double assembly
   const S attach = g.ratio * g.main_mm;
   const S foot = 0.5 * (a.distance_mm + (attach - g.second_mm) * (attach + g.second_mm) / a.distance_mm);
   a.height_2_mm2 = (attach - foot) * (attach + foot);
-  const bool reversed = !rails_apart && ValueOf(dx * g.rail_1.cosine + dy * g.rail_1.sine) < 0.0;
-  const S height = (reversed ? -assembly_mode : assembly_mode) * RootOrZero(a.height_2_mm2);
+  const S height = SideOf(S(dx * g.rail_1.cosine + dy * g.rail_1.sine), assembly_mode, rails_apart) *
+                   RootOrZero(a.height_2_mm2);
   const S ax = foot * ex - height * ey;
   const S ay = foot * ey + height * ex;
   a.attachment = {a.slider_1.x + ax, a.slider_1.y + ay};

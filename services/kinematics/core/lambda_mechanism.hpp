@@ -25,7 +25,7 @@ namespace lambdajet::kinematics {
 // The first nine entries of foundation's parameter vector are the mechanism's own.
 inline constexpr int kMechanismParameterCount = 9;
 using MechanismParameters = Eigen::Matrix<double, kMechanismParameterCount, 1>;
-using ParameterJacobian = Eigen::Matrix<double, 2, kMechanismParameterCount>;
+using LambdaParameterJacobian = Eigen::Matrix<double, 2, kMechanismParameterCount>;
 
 // A travel or a distance without a limit; finite, so that margins stay finite.
 inline constexpr double kUnlimitedMm = 1e9;
@@ -119,10 +119,11 @@ struct LambdaJacobians {
   bool invertible = false;             // J_x_q and J_x_parameters hold too
   Eigen::Matrix2d J_q_x = Eigen::Matrix2d::Zero();
   Eigen::Matrix2d J_x_q = Eigen::Matrix2d::Zero();
-  ParameterJacobian J_q_parameters = ParameterJacobian::Zero();  // of the inverse, the tool held
-  ParameterJacobian J_x_parameters = ParameterJacobian::Zero();  // of the forward, the readings held
-  double determinant = 0.0;                                      // of J_q_x
-  double condition = 0.0;                                        // 2-norm; 0 where not invertible
+  LambdaParameterJacobian J_q_parameters = LambdaParameterJacobian::Zero();  // of the inverse, the tool held
+  LambdaParameterJacobian J_x_parameters =
+      LambdaParameterJacobian::Zero();  // of the forward, the readings held
+  double determinant = 0.0;             // of J_q_x
+  double condition = 0.0;               // 2-norm; 0 where not invertible
   double smallest_singular_value = 0.0;
   double largest_singular_value = 0.0;
 };
