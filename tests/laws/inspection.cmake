@@ -1,0 +1,1 @@
+lambdajet_check(inspection_laws_test LABELS laws SOURCES inspection_laws_test.cpp DEPS inspection_core)

@@ -1,0 +1,1 @@
+lambdajet_check(inspection_drawing_file_test LABELS unit SOURCES inspection_drawing_file_test.cpp DEPS inspection_drawing_file)
