@@ -11,15 +11,15 @@ from cell_processes import SEVEN, START_ORDER, StartFailed
 
 BASE = os.environ.get("LAMBDAJET_CONTAINER_BASE", "localhost/debian:bookworm-slim")
 IMAGE = "localhost/lambdajet"
-ADDRESSES = {
-    "kinematics": "10.90.77.11:50051",
-    "calibration": "10.90.77.12:50052",
-    "trajectory": "10.90.77.13:50053",
-    "accuracy": "10.90.77.14:50054",
-    "cell": "10.90.77.15:50055",
-    "drive": "10.90.77.16:50056",
-    "main_motion": "10.90.77.17:50057",
-    "inspection": "10.90.77.18:50058",
+PORTS = {
+    "kinematics": 50051,
+    "calibration": 50052,
+    "trajectory": 50053,
+    "accuracy": 50054,
+    "cell": 50055,
+    "drive": 50056,
+    "main_motion": 50057,
+    "inspection": 50058,
 }
 USER = 65532
 
@@ -91,22 +91,29 @@ class Containers:
         return started
 
     def addresses(self):
-        return dict(ADDRESSES)
+        """Name -> address in the cell's network, of those that run."""
+        return {name: f"{address}:{PORTS[name]}" for name, (_, _, _, address) in self.inspect().items() if address}
 
     def container(self, name):
         return f"lambdajet_{name}_1"
 
     def inspect(self):
-        """name -> (running, exit code, pid)."""
+        """Name -> (running, exit code, pid, address)."""
         done = self.call("podman", "inspect", *[self.container(name) for name in START_ORDER], check=False)
         try:
             states = json.loads(done.stdout)
         except ValueError:
             return {}
-        return {name: (s["State"]["Running"], s["State"]["ExitCode"], s["State"]["Pid"]) for name, s in zip(START_ORDER, states)}
+        found = {}
+        for name, container in zip(START_ORDER, states):
+            state = container["State"]
+            networks = container["NetworkSettings"].get("Networks") or {}
+            address = next((network.get("IPAddress", "") for network in networks.values()), "")
+            found[name] = (state["Running"], state["ExitCode"], state["Pid"], address)
+        return found
 
     def check_alive(self):
-        for name, (running, code, _) in self.inspect().items():
+        for name, (running, code, _, _) in self.inspect().items():
             if not running and code != 0:
                 raise StartFailed(f"{name} ended with exit code {code}: {self.last_words(name)}")
 
@@ -116,7 +123,7 @@ class Containers:
 
     def resident_mib(self):
         result = {}
-        for name, (_, _, pid) in self.inspect().items():
+        for name, (_, _, pid, _) in self.inspect().items():
             try:
                 with open(f"/proc/{pid}/status", encoding="ascii") as status:
                     result[name] = next(int(line.split()[1]) / 1024.0 for line in status if line.startswith("VmRSS:"))
