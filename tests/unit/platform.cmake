@@ -1,0 +1,2 @@
+lambdajet_check(platform_machine_file_test LABELS unit SOURCES platform_machine_file_test.cpp
+  DEPS platform_machine_file test_support)
