@@ -1,1 +1,3 @@
 lambdajet_check(papers_kinematics_service_area LABELS papers SOURCES kinematics_service_area_test.cpp DEPS kinematics_spatial)
+lambdajet_check(papers_kinematics_hexapod LABELS papers SOURCES kinematics_hexapod_test.cpp DEPS kinematics_spatial)
+lambdajet_check(papers_kinematics_chain LABELS papers SOURCES kinematics_chain_test.cpp DEPS foundation_geometry)

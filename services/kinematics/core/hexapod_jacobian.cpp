@@ -225,7 +225,7 @@ PlatformMotion PlatformMotionOf(const Hexapod& hexapod, const Pose& X_MP, const 
   PoseJacobian J = ActuatorJacobian(hexapod, X_MP);
   J.rightCols<3>() /= hexapod.lever_mm();
   const Eigen::FullPivLU<PoseJacobian> lu(J);
-  if (!J.allFinite() || lu.rcond() < 1e-12) {
+  if (!J.allFinite() || lu.matrixLU().diagonal().cwiseAbs().minCoeff() < 1e-12 * lu.maxPivot()) {
     answer.reason = Reason::kSingular;
     return answer;
   }
