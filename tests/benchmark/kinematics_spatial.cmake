@@ -1,0 +1,5 @@
+find_package(benchmark REQUIRED)
+add_executable(benchmark_kinematics_hexapod kinematics_hexapod_benchmark.cpp)
+lambdajet_own_code(benchmark_kinematics_hexapod)
+target_include_directories(benchmark_kinematics_hexapod PRIVATE ${CMAKE_SOURCE_DIR})
+target_link_libraries(benchmark_kinematics_hexapod PRIVATE kinematics_spatial benchmark::benchmark)
