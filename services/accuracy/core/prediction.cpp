@@ -198,6 +198,10 @@ void Sample(const ContourModel& model, const PredictionOptions& options, Contour
   std::vector<double> all;
   std::vector<std::vector<double>> by_feature(model.features);
   for (std::size_t d = 0; d < draws; ++d) {
+    if (options.cancelled && options.cancelled()) {
+      prediction.reason = PredictionReason::kCancelled;
+      return;
+    }
     all.push_back(DrawContour(model, options.seed, d, space));
     for (std::size_t f = 0; f < by_feature.size(); ++f) {
       by_feature[f].push_back(space.feature_p95_mm[f]);
@@ -284,8 +288,8 @@ double SliderDeviation(const DrawnMachine& m, const ContourModel::Point& point) 
 }  // namespace
 
 std::string_view Name(PredictionReason reason) {
-  constexpr std::array<std::string_view, 6> kNames = {"UNKNOWN",    "PREDICTED",    "NO_CUTTING",
-                                                      "NOT_FINITE", "OUT_OF_ORDER", "UNREACHABLE"};
+  constexpr std::array<std::string_view, 7> kNames = {"UNKNOWN",      "PREDICTED",   "NO_CUTTING", "NOT_FINITE",
+                                                      "OUT_OF_ORDER", "UNREACHABLE", "CANCELLED"};
   const auto i = static_cast<std::size_t>(reason);
   return i < kNames.size() ? kNames[i] : kNames[0];
 }

@@ -20,6 +20,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <string_view>
 #include <vector>
@@ -37,6 +38,7 @@ struct PredictionOptions {
   std::uint64_t seed = 1;
   int points = 600;           // of the contour, at most
   double tolerance_mm = 0.0;  // for the probability of conformity; 0: not asked
+  std::function<bool()> cancelled = {};  // asked before each draw
 };
 
 enum class PredictionReason : std::uint8_t {
