@@ -46,7 +46,8 @@ enum class PredictionReason : std::uint8_t {
   kNoCutting = 2,  // no sample with the jet on moves
   kNotFinite = 3,
   kOutOfOrder = 4,  // tau goes back
-  kUnreachable = 5  // the mechanism cannot stand at `blame_line`
+  kUnreachable = 5,  // the mechanism cannot stand at `blame_line`
+  kCancelled = 6
 };
 std::string_view Name(PredictionReason reason);
 
