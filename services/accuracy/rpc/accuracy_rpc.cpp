@@ -33,7 +33,8 @@ grpc::ServerUnaryReactor* AccuracyRpc::PredictContour(grpc::CallbackServerContex
       return NoMachine();
     }
     question->options.cancelled = cancelled;
-    const ContourPrediction prediction = Predict(*machine, question->samples, question->compensated, question->options);
+    const ContourPrediction prediction =
+        Predict(*machine, question->samples, question->compensated, question->options);
     if (prediction.reason == PredictionReason::kCancelled) {
       return Trouble(absl::StatusCode::kCancelled, "CANCELLED", "the client has given the call up");
     }
@@ -43,7 +44,8 @@ grpc::ServerUnaryReactor* AccuracyRpc::PredictContour(grpc::CallbackServerContex
   });
 }
 
-grpc::ServerUnaryReactor* AccuracyRpc::Budget(grpc::CallbackServerContext* context, const v1::BudgetRequest* request,
+grpc::ServerUnaryReactor* AccuracyRpc::Budget(grpc::CallbackServerContext* context,
+                                              const v1::BudgetRequest* request,
                                               v1::BudgetResponse* response) {
   return Answer(context, [request, response]() -> absl::Status {
     const auto question = FromWire(*request);
@@ -57,7 +59,8 @@ grpc::ServerUnaryReactor* AccuracyRpc::Budget(grpc::CallbackServerContext* conte
   });
 }
 
-grpc::ServerUnaryReactor* AccuracyRpc::ErrorMap(grpc::CallbackServerContext* context, const v1::ErrorMapRequest* request,
+grpc::ServerUnaryReactor* AccuracyRpc::ErrorMap(grpc::CallbackServerContext* context,
+                                                const v1::ErrorMapRequest* request,
                                                 v1::ErrorMapResponse* response) {
   return AnswerOn(pool_, context, [this, request, response](const Cancelled&) -> absl::Status {
     const auto options = FromWire(*request);

@@ -20,7 +20,8 @@ class AccuracyRpc final : public v1::AccuracyService::CallbackService {
  public:
   explicit AccuracyRpc(ActiveMachine active_machine);
 
-  grpc::ServerUnaryReactor* PredictContour(grpc::CallbackServerContext* context, const v1::PredictContourRequest* request,
+  grpc::ServerUnaryReactor* PredictContour(grpc::CallbackServerContext* context,
+                                           const v1::PredictContourRequest* request,
                                            v1::PredictContourResponse* response) override;
   grpc::ServerUnaryReactor* Budget(grpc::CallbackServerContext* context, const v1::BudgetRequest* request,
                                    v1::BudgetResponse* response) override;

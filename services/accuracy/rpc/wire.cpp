@@ -16,8 +16,8 @@ std::vector<PlanSample> SamplesFromWire(const v1::PredictContourRequest& request
   std::vector<PlanSample> samples(static_cast<std::size_t>(request.cutting_size()));
   for (int i = 0; i < request.cutting_size(); ++i) {
     const double* v = request.values().data() + kPlanStride * i;
-    samples[static_cast<std::size_t>(i)] = {v[0], v[1], v[2], v[3], v[4], v[5], v[6], v[7], request.cutting(i) != 0,
-                                            request.source_line(i)};
+    samples[static_cast<std::size_t>(i)] = {
+        v[0], v[1], v[2], v[3], v[4], v[5], v[6], v[7], request.cutting(i) != 0, request.source_line(i)};
   }
   return samples;
 }
@@ -28,10 +28,13 @@ absl::StatusOr<PredictQuestion> FromWire(const v1::PredictContourRequest& reques
   ArgumentChecks checks;
   const auto points = static_cast<std::size_t>(request.cutting_size());
   checks.CountInRange("cutting", points, 2, kMostPlanPoints);
-  checks.Require(static_cast<std::size_t>(request.values_size()) == kPlanStride * points, "values", "WRONG_COUNT",
-                 std::to_string(request.values_size()) + " numbers; must be 8 for each of " + std::to_string(points) + " points");
+  checks.Require(static_cast<std::size_t>(request.values_size()) == kPlanStride * points, "values",
+                 "WRONG_COUNT",
+                 std::to_string(request.values_size()) + " numbers; must be 8 for each of " +
+                     std::to_string(points) + " points");
   checks.Require(static_cast<std::size_t>(request.source_line_size()) == points, "source_line", "WRONG_COUNT",
-                 std::to_string(request.source_line_size()) + " lines; must be one for each of " + std::to_string(points) + " points");
+                 std::to_string(request.source_line_size()) + " lines; must be one for each of " +
+                     std::to_string(points) + " points");
   checks.AllFinite("values", request.values());
   checks.CountInRange("draws", request.draws(), 0, static_cast<std::size_t>(kMostDraws));
   if (request.has_tolerance_mm()) {
@@ -141,8 +144,8 @@ void ToWire(const ContourPrediction& prediction, v1::PredictContourResponse& wir
   }
 }
 
-void ToWire(const std::vector<PlaceError>& map, const std::vector<ParameterShare>& ranking, const ErrorMapOptions& options,
-            v1::ErrorMapResponse& wire) {
+void ToWire(const std::vector<PlaceError>& map, const std::vector<ParameterShare>& ranking,
+            const ErrorMapOptions& options, v1::ErrorMapResponse& wire) {
   wire.set_columns(static_cast<std::uint32_t>(options.columns));
   wire.set_rows(static_cast<std::uint32_t>(options.rows));
   wire.mutable_values()->Reserve(static_cast<int>(4 * map.size()));

@@ -33,7 +33,7 @@ absl::StatusOr<ErrorMapOptions> FromWire(const v1::ErrorMapRequest& request);
 
 void ToWire(const MachineDescription& machine, machine::v1::ModelVersion& wire);
 void ToWire(const ContourPrediction& prediction, v1::PredictContourResponse& wire);
-void ToWire(const std::vector<PlaceError>& map, const std::vector<ParameterShare>& ranking, const ErrorMapOptions& options,
-            v1::ErrorMapResponse& wire);
+void ToWire(const std::vector<PlaceError>& map, const std::vector<ParameterShare>& ranking,
+            const ErrorMapOptions& options, v1::ErrorMapResponse& wire);
 
 }  // namespace lambdajet::accuracy

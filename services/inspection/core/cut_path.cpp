@@ -16,10 +16,11 @@ void SortByTime(std::vector<Sample>& samples) {
 double Seconds(std::int64_t ns) { return 1e-9 * static_cast<double>(ns); }
 
 // The usual distance of stamps: the median, so that gaps do not count.
-std::int64_t Period(const std::vector<SheetTruth>& sheet) {
+template <class Sample>
+std::int64_t Period(const std::vector<Sample>& samples) {
   std::vector<std::int64_t> steps;
-  for (std::size_t i = 1; i < sheet.size(); ++i) {
-    steps.push_back(sheet[i].time_ns - sheet[i - 1].time_ns);
+  for (std::size_t i = 1; i < samples.size(); ++i) {
+    steps.push_back(samples[i].time_ns - samples[i - 1].time_ns);
   }
   if (steps.empty()) {
     return 1;
@@ -147,8 +148,8 @@ bool Within(const std::vector<Stretch>& stretches, std::int64_t from_ns, std::in
 }
 
 template <class Sample>
-void CountMissing(const std::vector<Sample>& samples, std::int64_t period_ns, const std::vector<Stretch>& on,
-                  CutPath& path) {
+void CountMissing(const std::vector<Sample>& samples, const std::vector<Stretch>& on, CutPath& path) {
+  const std::int64_t period_ns = Period(samples);
   for (std::size_t i = 1; i < samples.size(); ++i) {
     const std::int64_t step = samples[i].time_ns - samples[i - 1].time_ns;
     const auto lost =
@@ -173,9 +174,8 @@ CutPath JoinTruth(Truth truth) {
   const std::int64_t first = std::max(truth.sheet.front().time_ns, truth.jet.front().time_ns);
   const std::int64_t last = std::min(truth.sheet.back().time_ns, truth.jet.back().time_ns);
   const std::vector<Stretch> on = WaterOn(truth, first, last);
-  const std::int64_t period = Period(truth.sheet);
-  CountMissing(truth.sheet, period, on, path);
-  CountMissing(truth.jet, period, on, path);
+  CountMissing(truth.sheet, on, path);
+  CountMissing(truth.jet, on, path);
   Interpolator interpolate(truth);
   for (const Stretch& stretch : on) {
     TrailingFront front(truth.lag_time_s);
