@@ -1,4 +1,4 @@
-#include "support/virtual_cell.hpp"
+#include "tests/support/virtual_cell.hpp"
 
 #include <algorithm>
 #include <chrono>
@@ -72,7 +72,8 @@ void VirtualCell::Begin(const Plan& plan) {
   Load();
   Step(0.02);
   Send(Verb::kArm, kTargetDrive | kTargetMainMotion);
-  StepUntil([this] { return drive().mode == ModuleMode::kArmed && main_motion().mode == ModuleMode::kArmed; }, 60.0);
+  StepUntil([this] { return drive().mode == ModuleMode::kArmed && main_motion().mode == ModuleMode::kArmed; },
+            60.0);
   Step(0.01);
   start_ns_ = now_ns_ + ToNs(0.05);
   recording_ = true;
@@ -83,7 +84,9 @@ void VirtualCell::Home() {
   Step(0.01);
   if (!drive().referenced || main_motion().mode == ModuleMode::kSafe) {
     Send(Verb::kHome, kTargetDrive | kTargetMainMotion);
-    StepUntil([this] { return drive().mode == ModuleMode::kReady && main_motion().mode == ModuleMode::kReady; }, 10.0);
+    StepUntil(
+        [this] { return drive().mode == ModuleMode::kReady && main_motion().mode == ModuleMode::kReady; },
+        10.0);
   }
 }
 
@@ -156,7 +159,8 @@ void VirtualCell::Post(Wire<T>& wire, const T& sample) {
   if (link.loss > 0.0 && uniform(random_) < link.loss) {
     return;
   }
-  const auto delay_ns = link.delay_ns + static_cast<std::int64_t>(static_cast<double>(link.jitter_ns) * uniform(random_));
+  const auto delay_ns =
+      link.delay_ns + static_cast<std::int64_t>(static_cast<double>(link.jitter_ns) * uniform(random_));
   wire.flying.push_back({now_ns_ + delay_ns, sample});
   if (link.duplicate > 0.0 && uniform(random_) < link.duplicate) {
     wire.flying.push_back({now_ns_ + delay_ns + static_cast<std::int64_t>(2e7 * uniform(random_)), sample});
@@ -244,7 +248,8 @@ void VirtualCell::StreamSegments() {
   batch.segment_count = static_cast<std::uint32_t>(plan_.segments.size());
   batch.elastic_lag_s2 = plan_.elastic_lag_s2;
   batch.duration_s = plan_.duration_s;
-  for (std::uint32_t i = wish.next_segment; i < plan_.segments.size() && batch.count < kSegmentsPerBatch; ++i) {
+  for (std::uint32_t i = wish.next_segment; i < plan_.segments.size() && batch.count < kSegmentsPerBatch;
+       ++i) {
     batch.segments[batch.count++] = plan_.segments[i];
   }
   if (batch.count > 0) {
@@ -265,7 +270,8 @@ void VirtualCell::StreamProcess() {
   batch.plan = plan_.id;
   batch.gate_total = static_cast<std::uint32_t>(plan_.gates.size());
   batch.event_total = static_cast<std::uint32_t>(plan_.events.size());
-  for (std::size_t i = wish.next_gate - 1; i < plan_.gates.size() && batch.gate_count < kEventsPerBatch; ++i) {
+  for (std::size_t i = wish.next_gate - 1; i < plan_.gates.size() && batch.gate_count < kEventsPerBatch;
+       ++i) {
     batch.gates[batch.gate_count++] = plan_.gates[i];
   }
   for (std::size_t i = wish.next_event; i < plan_.events.size() && batch.event_count < kEventsPerBatch; ++i) {

@@ -26,26 +26,26 @@ struct LinkQuality {
   std::int64_t delay_ns = 200'000;
   std::int64_t jitter_ns = 100'000;  // uniform, on top
   double loss = 0.0;
-  double duplicate = 0.0;            // the copy comes later by up to 20 ms
+  double duplicate = 0.0;  // the copy comes later by up to 20 ms
 };
 
 struct CellOptions {
-  std::uint64_t seed = 1;            // of the plants' noise and of the link
+  std::uint64_t seed = 1;  // of the plants' noise and of the link
   LinkQuality link;
   drive::DriveConfig drive;
   main_motion::MainMotionConfig main_motion;
-  double time_limit_s = 1800.0;      // of virtual time, per run
-  int state_every = 10;              // control periods between recorded drive states
+  double time_limit_s = 1800.0;  // of virtual time, per run
+  int state_every = 10;          // control periods between recorded drive states
 };
 
 // What one run left behind. Samples every millisecond from START (or the first motion) to the end.
 struct CellRun {
   bool complete = false;
-  double duration_s = 0.0;           // virtual time from START to COMPLETE
+  double duration_s = 0.0;  // virtual time from START to COMPLETE
   double wall_s = 0.0;
   double jet_lag_time_s = 0.0;
-  std::vector<simulated_plant::SheetSample> drive_truth;   // X_DW
-  std::vector<simulated_plant::JetSample> jet_truth;       // p_DJ
+  std::vector<simulated_plant::SheetSample> drive_truth;  // X_DW
+  std::vector<simulated_plant::JetSample> jet_truth;      // p_DJ
   std::vector<simulated_plant::JetSwitch> switches;
   std::vector<Measurement> measurements;
   std::vector<ProcessRecord> process_records;
@@ -56,7 +56,8 @@ struct CellRun {
 
 class VirtualCell {
  public:
-  VirtualCell(const MachineDescription& machine, const simulated_plant::PlantTruth& truth, const CellOptions& options);
+  VirtualCell(const MachineDescription& machine, const simulated_plant::PlantTruth& truth,
+              const CellOptions& options);
   ~VirtualCell();
 
   // Homes both modules if they are not, loads, streams, arms, starts, and waits for the end.
@@ -67,16 +68,16 @@ class VirtualCell {
 
   // Piece by piece, for tests of trouble. A Begin is Run without the waiting.
   void Begin(const Plan& plan);
-  bool Finished() const;             // COMPLETE, STOPPED or FAULT
-  CellRun Take();                    // what has been recorded since Begin
-  void Step();                       // one control period of both modules
+  bool Finished() const;  // COMPLETE, STOPPED or FAULT
+  CellRun Take();         // what has been recorded since Begin
+  void Step();            // one control period of both modules
   void Step(double seconds);
   bool StepUntil(const std::function<bool()>& condition, double limit_s);
   void Send(Verb verb, std::uint32_t target, double value = 0.0, std::int64_t start_at_ns = 0);
   void SendTo(const ModuleCommand& command);
 
   void set_link(const LinkQuality& quality) { options_.link = quality; }
-  void set_drive_running(bool running) { drive_running_ = running; }              // false: silent, as if killed
+  void set_drive_running(bool running) { drive_running_ = running; }  // false: silent, as if killed
   void set_main_motion_running(bool running) { main_motion_running_ = running; }
   void set_streaming(bool streaming) { streaming_ = streaming; }
   std::function<void(const drive::Setpoint&)> on_setpoint;  // each one written

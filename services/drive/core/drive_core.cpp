@@ -16,12 +16,14 @@ constexpr std::int64_t kStartLatest_ns = 60'000'000'000;
 constexpr double kPositionTolerance_mm = 0.01;
 constexpr double kVelocityTolerance = 1.05;
 constexpr int kCatchUpCycles = 512;
-constexpr double kSmallestRateAcceleration = 0.8;  // a hold must come to an end, whatever the path asks of the actuators
+constexpr double kSmallestRateAcceleration =
+    0.8;  // a hold must come to an end, whatever the path asks of the actuators
 
 std::int64_t ToNs(double s) { return static_cast<std::int64_t>(std::llround(1e9 * s)); }
 
 bool PeerDown(ModuleMode mode) {
-  return mode == kOff || mode == kInitialising || mode == kSafe || mode == kStopping || mode == kStopped || mode == kFault;
+  return mode == kOff || mode == kInitialising || mode == kSafe || mode == kStopping || mode == kStopped ||
+         mode == kFault;
 }
 
 }  // namespace
@@ -31,7 +33,8 @@ DriveCore::DriveCore(const DriveConfig& config, DriveHardware& hardware)
       hardware_(hardware),
       period_ns_(ToNs(config.period_s)),
       buffer_(config.buffer),
-      play_({.period_ns = period_ns_, .lead_ns = ToNs(config.setpoint_lead_s), .guard_ns = 2 * period_ns_}, buffer_),
+      play_({.period_ns = period_ns_, .lead_ns = ToNs(config.setpoint_lead_s), .guard_ns = 2 * period_ns_},
+            buffer_),
       peer_watch_(period_ns_),
       late_cycles_(config.overrun_window, 0) {
   gates_.reserve(kGateCapacity);
@@ -220,7 +223,8 @@ ModuleReason DriveCore::ObeyStart(const ModuleCommand& command) {
   if (!ClockFit()) {
     return ModuleReason::kClockOffset;
   }
-  const std::int64_t start_ns = command.start_at_ns == 0 ? now_ns_ + 2 * kStartSoonest_ns : command.start_at_ns;
+  const std::int64_t start_ns =
+      command.start_at_ns == 0 ? now_ns_ + 2 * kStartSoonest_ns : command.start_at_ns;
   if (start_ns < now_ns_ + kStartSoonest_ns || start_ns > now_ns_ + kStartLatest_ns) {
     return ModuleReason::kStaleCommand;
   }
@@ -407,8 +411,8 @@ void DriveCore::WatchBuffer() {
   PathClock start = play_.head().clock;
   start.RunAt(rate_wanted_);
   const RateLimits limits = RateLimitsNow();
-  const bool enough_ahead = WholePlanHeld() ||
-                            buffer_.end_tau_s() - start.tau_s() > start.StoppingTau(limits) + reserve_s;
+  const bool enough_ahead =
+      WholePlanHeld() || buffer_.end_tau_s() - start.tau_s() > start.StoppingTau(limits) + reserve_s;
   play_.OpenGates(now_ns_, gate_passed_, enough_ahead);
   if (mode_ == kRunning || (mode_ == kResuming && ramping_up_)) {
     const PlayHead& head = play_.head();
@@ -445,8 +449,8 @@ void DriveCore::WatchRetrace() {
   const double stop_tau_s = std::max(buffer_.first_tau_s(), stopping.tau_s() + stopping.StoppingTau(limits));
   const Segment& segment = buffer_.at(buffer_.Find(stop_tau_s, head.segment));
   const double s_mm = segment.s_mm.value(stop_tau_s - segment.start_s);
-  const bool at_gate = head.segment > buffer_.first_index() &&
-                       stop_tau_s <= segment.start_s && buffer_.at(head.segment - 1).gate_at_end != 0;
+  const bool at_gate = head.segment > buffer_.first_index() && stop_tau_s <= segment.start_s &&
+                       buffer_.at(head.segment - 1).gate_at_end != 0;
   if (s_mm <= retrace_to_s_mm_ || stop_tau_s <= buffer_.first_tau_s() || at_gate) {
     retracing_ = false;
     play_.Retarget(now_ns_, 0.0, limits);
@@ -514,7 +518,8 @@ bool DriveCore::Apply(Event event, ModuleReason reason) {
     reason_ = reason;
   }
   if (mode_ != from) {
-    changes_[changes_made_++ % kModeChanges] = {now_ns_, from, mode_, reason_, plan_.id, play_.PointAt(now_ns_).s_mm};
+    changes_[changes_made_++ % kModeChanges] = {now_ns_, from,     mode_,
+                                                reason_, plan_.id, play_.PointAt(now_ns_).s_mm};
   }
   if (from == kRunning || from == kResuming) {
     cutting_at_hold_ = (from == kResuming && cutting_at_hold_) || peer_.jet_on;
@@ -677,8 +682,9 @@ double DriveCore::AllowedRate() const {
   double rate = override_;
   for (std::uint32_t i = play_.head().segment; buffer_.Holds(i); ++i) {
     const SegmentBounds& bounds = buffer_.bounds(i);
-    rate = std::min({rate, limits_.velocity_mm_per_s / std::max(1e-9, bounds.velocity_mm_per_s),
-                     std::sqrt(limits_.acceleration_mm_per_s2 / std::max(1e-9, bounds.acceleration_mm_per_s2))});
+    rate =
+        std::min({rate, limits_.velocity_mm_per_s / std::max(1e-9, bounds.velocity_mm_per_s),
+                  std::sqrt(limits_.acceleration_mm_per_s2 / std::max(1e-9, bounds.acceleration_mm_per_s2))});
   }
   return std::max(1.0, rate);
 }
@@ -750,8 +756,8 @@ void DriveCore::Report() {
   state_.peer_session = peer_guard_.session();
   state_.peer_sequence_number = peer_guard_.sequence_number();
   state_.loop_overruns = overruns_;
-  state_.dropped_samples = peer_guard_.dropped() + command_guard_.dropped() + segment_guard_.dropped() +
-                           process_guard_.dropped();
+  state_.dropped_samples =
+      peer_guard_.dropped() + command_guard_.dropped() + segment_guard_.dropped() + process_guard_.dropped();
 }
 
 }  // namespace lambdajet::drive

@@ -31,22 +31,22 @@ namespace lambdajet::drive {
 struct DriveConfig {
   std::uint64_t session = 1;
   double period_s = 0.001;
-  double setpoint_lead_s = 0.05;           // how far ahead of time set-points go to the servo
-  double peer_deadline_s = 0.02;           // main-motion state, while a plan is running
-  double peer_patience_s = 2.0;            // then the hold becomes a stop
-  double starvation_reserve_s = 0.1;       // program time kept beyond the stopping distance
-  double refill_s = 0.8;                   // program time that ends a starvation hold
+  double setpoint_lead_s = 0.05;      // how far ahead of time set-points go to the servo
+  double peer_deadline_s = 0.02;      // main-motion state, while a plan is running
+  double peer_patience_s = 2.0;       // then the hold becomes a stop
+  double starvation_reserve_s = 0.1;  // program time kept beyond the stopping distance
+  double refill_s = 0.8;              // program time that ends a starvation hold
   double clock_offset_limit_s = 0.0002;
-  bool hold_on_clock_offset = false;       // while cutting: finish (false) or hold
+  bool hold_on_clock_offset = false;  // while cutting: finish (false) or hold
   double following_error_limit_mm = 0.5;
   std::uint32_t following_error_cycles = 5;
-  std::uint32_t overruns_allowed = 5;      // in overrun_window cycles
+  std::uint32_t overruns_allowed = 5;  // in overrun_window cycles
   std::uint32_t overrun_window = 100;
-  double resume_overlap_mm = 1.0;          // a cut that was held is taken up this much earlier
+  double resume_overlap_mm = 1.0;  // a cut that was held is taken up this much earlier
   double retrace_rate = 0.5;
   double command_age_limit_s = 2.0;
-  double positioning_share = 0.3;          // of the actuators' limits, for the move to a plan's start
-  double rate_acceleration_per_s = 5.0;    // bounds of the path clock; the actuators' limits may narrow them
+  double positioning_share = 0.3;        // of the actuators' limits, for the move to a plan's start
+  double rate_acceleration_per_s = 5.0;  // bounds of the path clock; the actuators' limits may narrow them
   double rate_jerk_per_s2 = 60.0;
   SegmentBuffer::Limits buffer;
 };
@@ -80,7 +80,7 @@ class DriveCore {
     std::uint32_t version = 0;
     bool known = false;
     std::array<ActuatorLimits, kActuatorCount> actuators{};
-    double velocity_mm_per_s = 0.0;       // the weaker actuator's
+    double velocity_mm_per_s = 0.0;  // the weaker actuator's
     double acceleration_mm_per_s2 = 0.0;
     double jerk_mm_per_s3 = 0.0;
   };
@@ -88,7 +88,7 @@ class DriveCore {
     std::uint64_t id = 0;
     std::uint32_t segment_count = 0;
     double duration_s = 0.0;
-    double tau_s = 0.0;        // where START begins: 0, or where a stop left it
+    double tau_s = 0.0;  // where START begins: 0, or where a stop left it
     bool begun = false;
   };
 
@@ -126,7 +126,7 @@ class DriveCore {
   bool WithinLimits(const Setpoint& setpoint) const;
   RateLimits RateLimitsNow() const;
   double AllowedRate() const;
-  double AheadTau() const;           // program time the buffer bears: to its end, or to a closed gate
+  double AheadTau() const;  // program time the buffer bears: to its end, or to a closed gate
   bool WholePlanHeld() const;
   bool Moving() const;
   bool Standing() const;
@@ -165,7 +165,7 @@ class DriveCore {
   double retrace_to_s_mm_ = 0.0;
   bool ramping_up_ = false;
   bool cutting_at_hold_ = false;
-  std::uint64_t resuming_since_ = 0;   // sequence number of the first RESUMING state
+  std::uint64_t resuming_since_ = 0;  // sequence number of the first RESUMING state
   std::int64_t start_at_ns_ = 0;
 
   MainMotionState peer_;

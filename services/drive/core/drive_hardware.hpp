@@ -19,9 +19,9 @@ struct DriveReadings {
   std::array<double, kActuatorCount> position_mm{};
   std::array<double, kActuatorCount> velocity_mm_per_s{};
   bool referenced = false;
-  bool sensor_fault = false;              // the encoder itself says so
-  std::uint32_t setpoints_late = 0;       // dropped since start
-  std::uint32_t setpoints_missing = 0;    // times the queue ran dry since start
+  bool sensor_fault = false;            // the encoder itself says so
+  std::uint32_t setpoints_late = 0;     // dropped since start
+  std::uint32_t setpoints_missing = 0;  // times the queue ran dry since start
 };
 
 struct Setpoint {

@@ -30,7 +30,9 @@ class PathClock {
   double tau_s() const { return tau_s_; }
   double rate() const { return rate_; }
   double rate_per_s() const { return rate_per_s_; }
-  double rate_per_s2() const { return settled() ? 0.0 : phases_[static_cast<std::size_t>(phase_)].jerk_per_s2; }
+  double rate_per_s2() const {
+    return settled() ? 0.0 : phases_[static_cast<std::size_t>(phase_)].jerk_per_s2;
+  }
   double target() const { return target_; }
   bool settled() const { return phase_ == kPhases; }
 

@@ -9,8 +9,8 @@
 namespace lambdajet::drive {
 namespace {
 
-constexpr double kTauTouch_s = 1e-9;     // a gate this near counts as reached
-constexpr double kQuinticVelocity = 1.875;      // peak z' of the rest-to-rest quintic, per distance and time
+constexpr double kTauTouch_s = 1e-9;        // a gate this near counts as reached
+constexpr double kQuinticVelocity = 1.875;  // peak z' of the rest-to-rest quintic, per distance and time
 constexpr double kQuinticAcceleration = 5.7735026918962577;  // 10/sqrt(3), peak z'' likewise
 
 struct Law {
@@ -34,8 +34,8 @@ void PlayOut::Stand(std::int64_t now_ns, const std::array<double, kActuatorCount
   Restart(now_ns);
 }
 
-void PlayOut::Position(std::int64_t now_ns, const std::array<double, kActuatorCount>& to_mm, double velocity_mm_per_s,
-                       double acceleration_mm_per_s2) {
+void PlayOut::Position(std::int64_t now_ns, const std::array<double, kActuatorCount>& to_mm,
+                       double velocity_mm_per_s, double acceleration_mm_per_s2) {
   Rewind(now_ns);
   from_mm_ = Evaluate(head_).position_mm;
   to_mm_ = to_mm;
@@ -139,7 +139,8 @@ PathPoint PlayOut::PointAt(std::int64_t time_ns) const {
   const double dt_s = 1e-9 * static_cast<double>(time_ns - head.time_ns);
   point.s_rate_mm_per_s = first * w;
   point.s_acceleration_mm_per_s2 = segment.s_mm.second(t) * w * w + first * head.clock.rate_per_s();
-  point.s_mm = segment.s_mm.value(t) + (point.s_rate_mm_per_s + 0.5 * point.s_acceleration_mm_per_s2 * dt_s) * dt_s;
+  point.s_mm =
+      segment.s_mm.value(t) + (point.s_rate_mm_per_s + 0.5 * point.s_acceleration_mm_per_s2 * dt_s) * dt_s;
   point.s_rate_mm_per_s += point.s_acceleration_mm_per_s2 * dt_s;
   point.tau_s = head.clock.tau_s() + (w + 0.5 * head.clock.rate_per_s() * dt_s) * dt_s;
   return point;

@@ -25,11 +25,11 @@ struct PlayHead {
   std::int64_t time_ns = 0;
   PlaySource source = PlaySource::kStand;
   PathClock clock;
-  double wanted_rate = 0.0;        // taken up when a gate opens
+  double wanted_rate = 0.0;  // taken up when a gate opens
   std::uint32_t segment = 0;
   std::uint32_t gate_waiting = 0;
-  bool finished = false;           // stands at the plan's end
-  bool dry = false;                // ran to the end of the buffer: must not happen, see DriveCore's starvation watch
+  bool finished = false;  // stands at the plan's end
+  bool dry = false;       // ran to the end of the buffer: must not happen, see DriveCore's starvation watch
 
   bool standing() const { return clock.rate() == 0.0 && clock.settled(); }
 };
@@ -54,8 +54,8 @@ class PlayOut {
   // Stands at a position with no plan, from now on.
   void Stand(std::int64_t now_ns, const std::array<double, kActuatorCount>& position_mm);
   // Goes to a position by a rest-to-rest quintic within the limits.
-  void Position(std::int64_t now_ns, const std::array<double, kActuatorCount>& to_mm, double velocity_mm_per_s,
-                double acceleration_mm_per_s2);
+  void Position(std::int64_t now_ns, const std::array<double, kActuatorCount>& to_mm,
+                double velocity_mm_per_s, double acceleration_mm_per_s2);
   // Plays the plan from tau from a common time on: at `rate` at once, or standing there for a Retarget.
   void Start(std::int64_t now_ns, std::int64_t start_at_ns, double tau_s, double rate);
   void CancelStart(std::int64_t now_ns);
@@ -66,7 +66,9 @@ class PlayOut {
   void ForgetPlan();
 
   // Next grid point if it lies within the lead.
-  bool Due(std::int64_t now_ns) const { return head_.time_ns + timing_.period_ns <= now_ns + timing_.lead_ns; }
+  bool Due(std::int64_t now_ns) const {
+    return head_.time_ns + timing_.period_ns <= now_ns + timing_.lead_ns;
+  }
   bool Behind(std::int64_t now_ns) const { return head_.time_ns < now_ns; }
   Setpoint Advance();
 

@@ -17,7 +17,8 @@ bool Finite(const Polynomial& p) {
 }
 
 bool Finite(const Segment& segment) {
-  bool finite = std::isfinite(segment.start_s) && std::isfinite(segment.duration_s) && segment.duration_s > 0.0;
+  bool finite =
+      std::isfinite(segment.start_s) && std::isfinite(segment.duration_s) && segment.duration_s > 0.0;
   for (std::size_t i = 0; i < kActuatorCount; ++i) {
     finite = finite && Finite(segment.q_mm[i]) && Finite(segment.lead_mm[i]);
   }
@@ -112,8 +113,8 @@ bool SegmentBuffer::Joins(const Segment& segment) const {
   bool joined = std::abs(segment.start_s - last.start_s - last.duration_s) <= kTauJoint_s &&
                 std::abs(segment.s_mm.c[0] - last.s_mm.value(last.duration_s)) <= limits_.join_mm;
   for (std::size_t i = 0; i < kActuatorCount; ++i) {
-    joined = joined &&
-             std::abs(segment.q_mm[i].c[0] - last.q_mm[i].value(last.duration_s)) <= limits_.join_mm;
+    joined =
+        joined && std::abs(segment.q_mm[i].c[0] - last.q_mm[i].value(last.duration_s)) <= limits_.join_mm;
   }
   return joined;
 }

@@ -23,10 +23,10 @@ struct SegmentBounds {
 class SegmentBuffer {
  public:
   struct Limits {
-    std::uint32_t capacity = 4096;   // segments
-    double ahead_s = 4.0;            // program time that may be held ahead
-    double behind_s = 2.0;           // program time kept for backing up
-    double join_mm = 1e-3;           // largest step of a set-point or of s between neighbours
+    std::uint32_t capacity = 4096;  // segments
+    double ahead_s = 4.0;           // program time that may be held ahead
+    double behind_s = 2.0;          // program time kept for backing up
+    double join_mm = 1e-3;          // largest step of a set-point or of s between neighbours
   };
   explicit SegmentBuffer(const Limits& limits);
 

@@ -12,13 +12,47 @@
 namespace lambdajet::drive {
 
 enum class Event {
-  kPowerUp, kInitialised, kHome, kHomed, kLoad, kUnload, kArm, kPositioned, kStart, kStartTime, kContinueTime, kHold,
-  kStandstill, kBackUp, kRetrace, kResume, kPeerReady, kAtRate, kPlanEnd, kStop, kReset, kResetUnreferenced, kFault
+  kPowerUp,
+  kInitialised,
+  kHome,
+  kHomed,
+  kLoad,
+  kUnload,
+  kArm,
+  kPositioned,
+  kStart,
+  kStartTime,
+  kContinueTime,
+  kHold,
+  kStandstill,
+  kBackUp,
+  kRetrace,
+  kResume,
+  kPeerReady,
+  kAtRate,
+  kPlanEnd,
+  kStop,
+  kReset,
+  kResetUnreferenced,
+  kFault
 };
 
 enum class Action {
-  kNone, kBeginHoming, kEnable, kAdoptPlan, kDropPlan, kPosition, kScheduleStart, kBeginPlay, kRampDown, kBackUp,
-  kRetrace, kResumeAfterwards, kAwaitPeer, kRampUp, kDisable
+  kNone,
+  kBeginHoming,
+  kEnable,
+  kAdoptPlan,
+  kDropPlan,
+  kPosition,
+  kScheduleStart,
+  kBeginPlay,
+  kRampDown,
+  kBackUp,
+  kRetrace,
+  kResumeAfterwards,
+  kAwaitPeer,
+  kRampUp,
+  kDisable
 };
 
 struct Transition {

@@ -17,7 +17,7 @@ namespace lambdajet {
 
 inline constexpr std::uint32_t kSegmentsPerBatch = 8;
 inline constexpr std::uint32_t kEventsPerBatch = 32;
-inline constexpr std::uint32_t kTargetDrive = 1;       // bits of ModuleCommand::target
+inline constexpr std::uint32_t kTargetDrive = 1;  // bits of ModuleCommand::target
 inline constexpr std::uint32_t kTargetMainMotion = 2;
 
 // What every sample starts with: the writer's session is new at each start of its process.
@@ -117,7 +117,7 @@ struct SegmentBatch {
   std::uint64_t plan = 0;
   std::uint32_t segment_count = 0;  // of the whole plan
   double elastic_lag_s2 = 0.0;
-  double duration_s = 0.0;          // of the whole plan
+  double duration_s = 0.0;  // of the whole plan
   std::uint32_t count = 0;
   std::array<Segment, kSegmentsPerBatch> segments;
 };

@@ -54,7 +54,8 @@ void DriveTrack::LearnSegments(const SegmentBatch& batch) {
     const Segment& segment = batch.segments[i];
     // A gap is bridged by extrapolation; the table goes on behind it.
     if (segment.index >= next_segment_) {
-      segments_[segment.index % kSegments] = {segment.index, segment.start_s, segment.duration_s, segment.s_mm};
+      segments_[segment.index % kSegments] = {segment.index, segment.start_s, segment.duration_s,
+                                              segment.s_mm};
       next_segment_ = segment.index + 1;
     }
   }
@@ -82,7 +83,8 @@ std::optional<double> DriveTrack::PathRateAt(std::int64_t time_ns) const {
   if (after != nullptr) {
     return Between(*before, *after, time_ns).first;
   }
-  return before->s_rate_mm_per_s + before->s_acceleration_mm_per_s2 * Seconds(time_ns - before->header.time_ns);
+  return before->s_rate_mm_per_s +
+         before->s_acceleration_mm_per_s2 * Seconds(time_ns - before->header.time_ns);
 }
 
 std::optional<ActuatorPoint> DriveTrack::ActuatorsAt(std::int64_t time_ns) const {
@@ -95,10 +97,11 @@ std::optional<ActuatorPoint> DriveTrack::ActuatorsAt(std::int64_t time_ns) const
   const double u = Seconds(time_ns - before->header.time_ns) / h;
   ActuatorPoint point;
   for (std::size_t i = 0; i < kActuatorCount; ++i) {
-    point.position_mm[i] =
-        before->actuator_position_mm[i] + u * (after->actuator_position_mm[i] - before->actuator_position_mm[i]);
-    point.velocity_mm_per_s[i] = before->actuator_velocity_mm_per_s[i] +
-                                 u * (after->actuator_velocity_mm_per_s[i] - before->actuator_velocity_mm_per_s[i]);
+    point.position_mm[i] = before->actuator_position_mm[i] +
+                           u * (after->actuator_position_mm[i] - before->actuator_position_mm[i]);
+    point.velocity_mm_per_s[i] =
+        before->actuator_velocity_mm_per_s[i] +
+        u * (after->actuator_velocity_mm_per_s[i] - before->actuator_velocity_mm_per_s[i]);
     point.acceleration_mm_per_s2[i] =
         (after->actuator_velocity_mm_per_s[i] - before->actuator_velocity_mm_per_s[i]) / h;
   }

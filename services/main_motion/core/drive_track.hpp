@@ -27,7 +27,7 @@ class DriveTrack {
  public:
   DriveTrack();
 
-  void Clear();                       // another plan
+  void Clear();  // another plan
   void Heard(const DriveState& state);
   void LearnSegments(const SegmentBatch& batch);
 

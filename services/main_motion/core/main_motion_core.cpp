@@ -9,17 +9,18 @@ namespace {
 
 using enum ModuleMode;
 
-constexpr std::size_t kPlanCapacity = 65536;   // gates, and events
+constexpr std::size_t kPlanCapacity = 65536;  // gates, and events
 constexpr std::size_t kHoleCapacity = 8192;
 constexpr double kSame_mm = 1e-6;
 constexpr std::int64_t kJetLead_ns = 2'000'000;
 constexpr double kAbrasiveAfterWater_s = 0.005;
 constexpr double kLongestPrediction_s = 0.3;
-constexpr double kDwellGrace_s = 0.1;          // the drive opens a dwell by itself; this long after, main motion does
-constexpr double kDelayClamp = 0.5;            // a learnt delay stays within this share of its nominal, plus:
+constexpr double kDwellGrace_s = 0.1;  // the drive opens a dwell by itself; this long after, main motion does
+constexpr double kDelayClamp = 0.5;    // a learnt delay stays within this share of its nominal, plus:
 constexpr double kDelaySlack_s = 0.01;
 constexpr std::int32_t kFirstHole = 1000;
-constexpr std::int64_t kSpread_ns = 4'000'000;  // half width of the difference that gives slider accelerations
+constexpr std::int64_t kSpread_ns =
+    4'000'000;  // half width of the difference that gives slider accelerations
 
 std::int64_t ToNs(double s) { return static_cast<std::int64_t>(std::llround(1e9 * s)); }
 double ToSeconds(std::int64_t ns) { return 1e-9 * static_cast<double>(ns); }
@@ -34,7 +35,8 @@ bool TurnsOn(ProcessAction action) {
   return action == ProcessAction::kJetOn || action == ProcessAction::kAbrasiveOn;
 }
 bool PeerDown(ModuleMode mode) {
-  return mode == kOff || mode == kInitialising || mode == kSafe || mode == kStopping || mode == kStopped || mode == kFault;
+  return mode == kOff || mode == kInitialising || mode == kSafe || mode == kStopping || mode == kStopped ||
+         mode == kFault;
 }
 
 }  // namespace
@@ -266,8 +268,8 @@ void MainMotionCore::WatchHardware() {
 }
 
 void MainMotionCore::WatchPressure() {
-  const bool low = readings_.jet_on && readings_.pump_pressure_mpa <
-                                           config_.pressure_lost_ratio * config_.pump_pressure_mpa;
+  const bool low = readings_.jet_on &&
+                   readings_.pump_pressure_mpa < config_.pressure_lost_ratio * config_.pump_pressure_mpa;
   if (!low || !(mode_ == kRunning || mode_ == kHolding || mode_ == kResuming)) {
     pressure_low_since_ns_ = 0;
   } else if (pressure_low_since_ns_ == 0) {
@@ -326,8 +328,8 @@ void MainMotionCore::WatchArming() {
   if (!arming_ || mode_ != kReady || peer_lost_ || !PlanComplete() || track_.newest().plan != plan_) {
     return;
   }
-  const bool needs_pressure =
-      std::any_of(gates_.begin(), gates_.end(), [](const Gate& gate) { return gate.kind == GateKind::kPierce; });
+  const bool needs_pressure = std::any_of(gates_.begin(), gates_.end(),
+                                          [](const Gate& gate) { return gate.kind == GateKind::kPierce; });
   if (!needs_pressure ||
       readings_.pump_pressure_mpa >= config_.pressure_ready_ratio * config_.pump_pressure_mpa) {
     arming_ = false;
@@ -372,7 +374,8 @@ void MainMotionCore::RunGate() {
     case GateKind::kNone:
       return;  // the operator's
   }
-  if (gate_running_ != 0 && now_ns_ - gate_since_ns_ > ToNs(config_.gate_timeout_s + std::abs(gate.argument))) {
+  if (gate_running_ != 0 &&
+      now_ns_ - gate_since_ns_ > ToNs(config_.gate_timeout_s + std::abs(gate.argument))) {
     Apply(Event::kFault, ModuleReason::kGateTimeout);
   }
 }
@@ -399,7 +402,8 @@ void MainMotionCore::RunMeasureGate(const Gate& gate) {
   const auto mark = static_cast<std::int32_t>(std::lround(gate.argument));
   const std::uint32_t request = ++picture_requests_;
   asked_[request % asked_.size()] = {request, gate.id, mark};
-  hardware_.TakePicture(request, mark >= kFirstHole ? Feature::kHole : Feature::kMark, now_ns_ + 2 * period_ns_);
+  hardware_.TakePicture(request, mark >= kFirstHole ? Feature::kHole : Feature::kMark,
+                        now_ns_ + 2 * period_ns_);
 }
 
 void MainMotionCore::PassGate(const Gate& gate) {
@@ -804,7 +808,9 @@ bool MainMotionCore::DriveStandsAt(std::uint32_t gate) const {
   return drive.plan == plan_ && drive.mode == kRunning && drive.gate_waiting == gate && drive.tau_rate == 0.0;
 }
 
-bool MainMotionCore::PlanComplete() const { return gates_.size() == gate_total_ && events_.size() == event_total_; }
+bool MainMotionCore::PlanComplete() const {
+  return gates_.size() == gate_total_ && events_.size() == event_total_;
+}
 
 bool MainMotionCore::Busy() const {
   return mode_ == kArmed || mode_ == kRunning || mode_ == kHolding || mode_ == kHeld || mode_ == kResuming ||
@@ -831,8 +837,8 @@ void MainMotionCore::Report() {
   state_.peer_sequence_number = peer_guard_.sequence_number();
   state_.peer_age_s = track_.empty() ? 0.0 : ToSeconds(peer_watch_.age_ns(now_ns_));
   state_.loop_overruns = overruns_;
-  state_.dropped_samples = peer_guard_.dropped() + command_guard_.dropped() + process_guard_.dropped() +
-                           segment_guard_.dropped();
+  state_.dropped_samples =
+      peer_guard_.dropped() + command_guard_.dropped() + process_guard_.dropped() + segment_guard_.dropped();
 }
 
 }  // namespace lambdajet::main_motion

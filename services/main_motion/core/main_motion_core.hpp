@@ -29,18 +29,18 @@ namespace lambdajet::main_motion {
 struct MainMotionConfig {
   std::uint64_t session = 2;
   double period_s = 0.001;
-  double drive_deadline_s = 0.01;        // while a plan is running
-  double output_horizon_s = 0.02;        // outputs are scheduled this much ahead of the instant of command
+  double drive_deadline_s = 0.01;  // while a plan is running
+  double output_horizon_s = 0.02;  // outputs are scheduled this much ahead of the instant of command
   double pump_pressure_mpa = 380.0;
-  double pressure_ready_ratio = 0.9;     // of it: the jet may come on
-  double pressure_lost_ratio = 0.75;     // of it, for pressure_patience_s: the jet goes off
+  double pressure_ready_ratio = 0.9;  // of it: the jet may come on
+  double pressure_lost_ratio = 0.75;  // of it, for pressure_patience_s: the jet goes off
   double pressure_patience_s = 0.05;
   double stand_off_mm = 3.0;
   double stand_off_tolerance_mm = 0.1;
   double gate_timeout_s = 30.0;
   double camera_interval_s = 0.01;
   double command_age_limit_s = 2.0;
-  double valve_learning = 0.3;           // share of a new delay that is believed
+  double valve_learning = 0.3;  // share of a new delay that is believed
   std::uint32_t overruns_allowed = 5;
   std::uint32_t overrun_window = 100;
 };
@@ -72,7 +72,7 @@ class MainMotionCore {
   enum class Progress : std::uint8_t { kWaiting, kScheduled, kFired };
   // One water-on sequence: of a pierce gate, or of a resume.
   enum class PiercePhase : std::uint8_t { kNone, kPressure, kJet, kPiercing, kThrough };
-  struct Awaited {                 // a command on its way to its effect
+  struct Awaited {  // a command on its way to its effect
     bool pending = false;
     bool on = false;
     bool of_event = false;
@@ -125,7 +125,7 @@ class MainMotionCore {
   void RunMeasureGate(const Gate& gate);
   void RunRestore();
   void BeginPierce(double pierce_time_s);
-  bool AdvancePierce();            // true when through
+  bool AdvancePierce();  // true when through
   void PassGate(const Gate& gate);
   void RunEvents();
   void RunValveEvent(const ProcessEvent& event, std::int64_t due_ns);
@@ -161,7 +161,7 @@ class MainMotionCore {
   bool machine_known_ = false;
   std::uint32_t machine_version_ = 0;
   ProcessModel process_;
-  std::array<std::array<double, 2>, kValveCount> delay_s_{};    // [valve][off, on], as learnt
+  std::array<std::array<double, 2>, kValveCount> delay_s_{};  // [valve][off, on], as learnt
   std::array<std::array<double, 2>, kValveCount> nominal_s_{};
 
   std::uint64_t plan_ = 0;
@@ -186,7 +186,7 @@ class MainMotionCore {
   PiercePhase pierce_ = PiercePhase::kNone;
   double pierce_time_s_ = 0.0;
   std::int64_t pierce_since_ns_ = 0;
-  std::int64_t water_since_ns_ = 0;    // when the jet reached the sheet, as the sensor says
+  std::int64_t water_since_ns_ = 0;  // when the jet reached the sheet, as the sensor says
   bool abrasive_there_ = false;
   std::uint32_t gate_running_ = 0;
   std::int64_t gate_since_ns_ = 0;

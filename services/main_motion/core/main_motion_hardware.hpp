@@ -44,7 +44,7 @@ struct MainMotionReadings {
   double pump_pressure_mpa = 0.0;
   double abrasive_g_per_min = 0.0;
   double stand_off_mm = 0.0;
-  std::size_t effect_count = 0;    // since the last reading
+  std::size_t effect_count = 0;  // since the last reading
   std::array<OutputEffect, kEffectsPerCycle> effects{};
   std::size_t picture_count = 0;
   std::array<Picture, kPicturesPerCycle> pictures{};
@@ -56,7 +56,7 @@ class MainMotionHardware {
   virtual MainMotionReadings ReadState(std::int64_t now_ns) = 0;
   virtual void ScheduleOutput(Valve valve, bool on, std::int64_t at_ns) = 0;
   virtual void CancelOutput(Valve valve) = 0;
-  virtual void SetPump(bool on) = 0;             // off: idle, no pressure
+  virtual void SetPump(bool on) = 0;  // off: idle, no pressure
   virtual void SetStandOff(double stand_off_mm) = 0;
   virtual void TakePicture(std::uint32_t request, Feature feature, std::int64_t exposure_ns) = 0;
   virtual void BeginHoming() = 0;

@@ -12,12 +12,38 @@
 namespace lambdajet::main_motion {
 
 enum class Event {
-  kPowerUp, kInitialised, kHome, kHomed, kLoad, kUnload, kArm, kArmed, kPeerRunning, kPeerHolding, kPeerHeld,
-  kPeerResuming, kRestored, kPeerComplete, kPeerLost, kStop, kOutputsOff, kReset, kResetUnreferenced, kFault
+  kPowerUp,
+  kInitialised,
+  kHome,
+  kHomed,
+  kLoad,
+  kUnload,
+  kArm,
+  kArmed,
+  kPeerRunning,
+  kPeerHolding,
+  kPeerHeld,
+  kPeerResuming,
+  kRestored,
+  kPeerComplete,
+  kPeerLost,
+  kStop,
+  kOutputsOff,
+  kReset,
+  kResetUnreferenced,
+  kFault
 };
 
 enum class Action {
-  kNone, kBeginHoming, kAdoptPlan, kDropPlan, kPrepare, kSuspend, kRestore, kFinish, kShutDown
+  kNone,
+  kBeginHoming,
+  kAdoptPlan,
+  kDropPlan,
+  kPrepare,
+  kSuspend,
+  kRestore,
+  kFinish,
+  kShutDown
 };
 
 struct Transition {

@@ -20,7 +20,8 @@ constexpr double kGramPerKilo = 1000.0;  // kg mm/s^2 in mN: N/mm * 1000 / kg is
 std::int64_t ToNs(double s) { return static_cast<std::int64_t>(std::llround(1e9 * s)); }
 
 Oscillator Lever(double stiffness_n_per_mm, const LeversTruth& levers) {
-  return {std::sqrt(kGramPerKilo * stiffness_n_per_mm / levers.moving_mass_kg), levers.damping_ratio, kStep_s};
+  return {std::sqrt(kGramPerKilo * stiffness_n_per_mm / levers.moving_mass_kg), levers.damping_ratio,
+          kStep_s};
 }
 
 }  // namespace
@@ -57,7 +58,8 @@ drive::DriveReadings DrivePlant::ReadState(std::int64_t now_ns) {
   for (std::size_t i = 0; i < kActuatorCount; ++i) {
     readings.position_mm[i] = Reading(i, ahead_s);
     readings.velocity_mm_per_s[i] = servos_[i].velocity_mm_per_s;
-    readings.sensor_fault = readings.sensor_fault || Active(FaultKind::kSensorFault, static_cast<int>(i)) != nullptr;
+    readings.sensor_fault =
+        readings.sensor_fault || Active(FaultKind::kSensorFault, static_cast<int>(i)) != nullptr;
   }
   readings.referenced = referenced_;
   readings.setpoints_late = late_;
@@ -203,8 +205,7 @@ void DrivePlant::MoveServos() {
 
 // The set-point moves on a chord within a substep: the same free oscillation about it, with the jump of its speed.
 void DrivePlant::MoveSheet() {
-  const std::optional<Eigen::Vector2d> rigid =
-      TruePoint(truth_, {servos_[0].joint_mm, servos_[1].joint_mm});
+  const std::optional<Eigen::Vector2d> rigid = TruePoint(truth_, {servos_[0].joint_mm, servos_[1].joint_mm});
   if (!rigid) {
     broken_ = true;
     return;
@@ -232,8 +233,9 @@ double DrivePlant::Reading(std::size_t i, double ahead_s) {
   const ActuatorTruth& actuator = truth_.actuators[i];
   const double place = servo.position_mm + servo.velocity_mm_per_s * ahead_s;
   const double seen = place + ValueOf(actuator.encoder_wave, place);
-  double reading =
-      actuator.encoder_step_mm > 0.0 ? std::round(seen / actuator.encoder_step_mm) * actuator.encoder_step_mm : seen;
+  double reading = actuator.encoder_step_mm > 0.0
+                       ? std::round(seen / actuator.encoder_step_mm) * actuator.encoder_step_mm
+                       : seen;
   if (Active(FaultKind::kSensorFreeze, static_cast<int>(i)) != nullptr) {
     servo.frozen_mm = servo.frozen ? servo.frozen_mm : reading;
     servo.frozen = true;

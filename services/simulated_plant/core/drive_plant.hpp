@@ -40,12 +40,12 @@ class DrivePlant final : public drive::DriveHardware {
  private:
   struct Servo {
     Oscillator loop;
-    double position_mm = 0.0;        // slider, as the scale counts
+    double position_mm = 0.0;  // slider, as the scale counts
     double velocity_mm_per_s = 0.0;
     double wanted_mm = 0.0;
     double wanted_rate_mm_per_s = 0.0;
     double last_rate_mm_per_s = 0.0;
-    double joint_mm = 0.0;           // behind the backlash
+    double joint_mm = 0.0;  // behind the backlash
     double frozen_mm = 0.0;
     bool frozen = false;
   };
@@ -69,7 +69,7 @@ class DrivePlant final : public drive::DriveHardware {
   std::mt19937_64 random_;
   std::normal_distribution<double> normal_;
   std::array<Servo, kActuatorCount> servos_;
-  std::array<drive::Setpoint, kQueue> queue_{};   // ring, in time order
+  std::array<drive::Setpoint, kQueue> queue_{};  // ring, in time order
   std::size_t queue_first_ = 0;
   std::size_t queue_count_ = 0;
   drive::Setpoint played_;

@@ -10,9 +10,11 @@ namespace {
 
 constexpr double kHoming_s = 0.5;
 constexpr double kStandOffRate_mm_per_s = 40.0;
-constexpr double kShortestDelay = 0.2;              // of the mean, however the scatter falls
-constexpr std::int64_t kBlind_ns = 500'000'000;     // a picture without known truth by then shows nothing
+constexpr double kShortestDelay = 0.2;           // of the mean, however the scatter falls
+constexpr std::int64_t kBlind_ns = 500'000'000;  // a picture without known truth by then shows nothing
 constexpr std::int64_t kLongestPause_ns = 2'000'000'000;
+constexpr std::int64_t kPiercing_ns = 400'000'000;  // the stretch of a pierce that makes the hole
+constexpr std::int64_t kPiercingStep_ns = 10'000'000;
 
 std::int64_t ToNs(double s) { return static_cast<std::int64_t>(std::llround(1e9 * s)); }
 
@@ -49,9 +51,10 @@ main_motion::MainMotionReadings MainMotionPlant::ReadState(std::int64_t now_ns) 
   readings.sensor_fault = Active(FaultKind::kSensorFault, 0) != nullptr;
   readings.jet_on = jet.water;
   readings.abrasive_on = abrasive.water;
-  readings.pump_pressure_mpa = pressure_mpa_ + (pressure_mpa_ / truth_.pump.pressure_mpa) * truth_.pump.ripple_mpa *
-                                                   std::sin(2.0 * std::numbers::pi * truth_.pump.ripple_hz * 1e-9 *
-                                                            static_cast<double>(now_ns % 1'000'000'000'000));
+  readings.pump_pressure_mpa =
+      pressure_mpa_ + (pressure_mpa_ / truth_.pump.pressure_mpa) * truth_.pump.ripple_mpa *
+                          std::sin(2.0 * std::numbers::pi * truth_.pump.ripple_hz * 1e-9 *
+                                   static_cast<double>(now_ns % 1'000'000'000'000));
   readings.abrasive_g_per_min = abrasive.water ? truth_.pump.abrasive_g_per_min : 0.0;
   readings.stand_off_mm = stand_off_mm_;
   return readings;
@@ -73,7 +76,8 @@ void MainMotionPlant::CancelOutput(main_motion::Valve valve) {
 void MainMotionPlant::SetPump(bool on) { pump_on_ = on; }
 void MainMotionPlant::SetStandOff(double stand_off_mm) { stand_off_wanted_mm_ = stand_off_mm; }
 
-void MainMotionPlant::TakePicture(std::uint32_t request, main_motion::Feature feature, std::int64_t exposure_ns) {
+void MainMotionPlant::TakePicture(std::uint32_t request, main_motion::Feature feature,
+                                  std::int64_t exposure_ns) {
   if (shot_count_ < kShots) {
     shots_[(shot_first_ + shot_count_++) % kShots] = {request, feature, exposure_ns};
   }
@@ -145,7 +149,8 @@ void MainMotionPlant::RunValves(std::int64_t now_ns, main_motion::MainMotionRead
         line.water = line.effect.on;
         const std::int64_t seen_ns = line.effect.at_ns + ToNs(line.truth->sensor_s * normal_(random_));
         if (readings.effect_count < main_motion::kEffectsPerCycle) {
-          readings.effects[readings.effect_count++] = {static_cast<main_motion::Valve>(v), line.water, seen_ns};
+          readings.effects[readings.effect_count++] = {static_cast<main_motion::Valve>(v), line.water,
+                                                       seen_ns};
         }
         if (v == 0) {
           switches_.Put({line.effect.at_ns, line.water});
@@ -162,15 +167,27 @@ void MainMotionPlant::RunValves(std::int64_t now_ns, main_motion::MainMotionRead
   }
 }
 
+// The hole is where the jet stood over the first stretch of piercing, the sheet still swinging a little.
 void MainMotionPlant::SettleHoles() {
   std::size_t kept = 0;
   for (std::size_t i = 0; i < new_hole_count_; ++i) {
     const NewHole hole = new_holes_[i];
-    const std::optional<PlanarPose> X_DW = sheet_.PoseAt(hole.time_ns);
-    if (X_DW && holes_W_mm_.size() < kHoles) {
-      holes_W_mm_.push_back(X_DW->Inverse() * hole.p_DJ_mm);
-    } else if (!X_DW && time_ns_ - hole.time_ns < kLongestPause_ns) {
-      new_holes_[kept++] = hole;
+    if (sheet_.newest_ns() < hole.time_ns + kPiercing_ns) {
+      if (time_ns_ - hole.time_ns < kLongestPause_ns) {
+        new_holes_[kept++] = hole;
+      }
+      continue;
+    }
+    Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+    int count = 0;
+    for (std::int64_t t = hole.time_ns; t <= hole.time_ns + kPiercing_ns; t += kPiercingStep_ns) {
+      if (const std::optional<PlanarPose> X_DW = sheet_.PoseAt(t)) {
+        sum += X_DW->Inverse() * hole.p_DJ_mm;
+        ++count;
+      }
+    }
+    if (count > 0 && holes_W_mm_.size() < kHoles) {
+      holes_W_mm_.push_back(sum / count);
     }
   }
   new_hole_count_ = kept;

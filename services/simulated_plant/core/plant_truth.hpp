@@ -36,10 +36,10 @@ struct RailTruth {
 };
 
 struct ActuatorTruth {
-  double zero_mm = 0.0;              // place along the rail = reading + zero
+  double zero_mm = 0.0;  // place along the rail = reading + zero
   double encoder_step_mm = 0.001;
-  Wave encoder_wave;                 // sub-division error of the scale
-  double backlash_mm = 0.0;          // full width, between the scale and the joint
+  Wave encoder_wave;         // sub-division error of the scale
+  double backlash_mm = 0.0;  // full width, between the scale and the joint
   double servo_bandwidth_hz = 45.0;
   double servo_damping = 0.8;
 };
@@ -53,15 +53,15 @@ struct LeversTruth {
 
 // What moves the sheet in its clamp and the clamp on its parallelogram.
 struct ClampTruth {
-  double creep_mm = 0.0;             // one sigma, each coordinate
-  double creep_turn_rad = 0.0;       // one sigma
-  double creep_time_s = 20.0;        // correlation time
-  Wave parallelogram;                // turn of E over D's x; amplitude in rad
+  double creep_mm = 0.0;        // one sigma, each coordinate
+  double creep_turn_rad = 0.0;  // one sigma
+  double creep_time_s = 20.0;   // correlation time
+  Wave parallelogram;           // turn of E over D's x; amplitude in rad
 };
 
 struct JetStackTruth {
   double mixing_chamber_tilt_rad = 0.0;
-  double mixing_chamber_lever_mm = 147.7;   // nozzle joint to tube exit
+  double mixing_chamber_lever_mm = 147.7;  // nozzle joint to tube exit
   double mixing_chamber_azimuth_rad = 0.0;
   double focusing_tube_tilt_rad = 0.0;
   double focusing_tube_lever_mm = 76.2;
@@ -73,8 +73,8 @@ struct JetStackTruth {
 struct ValveTruth {
   double on_delay_s = 0.0;
   double off_delay_s = 0.0;
-  double scatter_s = 0.0;            // one sigma of each switching
-  double sensor_s = 0.0;             // one sigma of the sensor that sees the effect
+  double scatter_s = 0.0;  // one sigma of each switching
+  double sensor_s = 0.0;   // one sigma of the sensor that sees the effect
 };
 
 struct PumpTruth {
@@ -88,25 +88,25 @@ struct PumpTruth {
 struct CameraTruth {
   double p_HC_x_mm = 0.0;
   double p_HC_y_mm = 0.0;
-  double noise_mm = 0.0;             // one sigma, each coordinate
-  double field_of_view_mm = 8.0;     // half width
-  double latency_s = 0.01;           // exposure to reading
+  double noise_mm = 0.0;          // one sigma, each coordinate
+  double field_of_view_mm = 8.0;  // half width
+  double latency_s = 0.01;        // exposure to reading
 };
 
 enum class FaultKind : std::uint8_t { kStall, kSensorFreeze, kSensorFault, kPressureLoss, kValveDelay };
 
 struct Fault {
   FaultKind kind = FaultKind::kStall;
-  int index = 0;                     // actuator or valve
-  double from_s = 0.0;               // after the plant's start
+  int index = 0;        // actuator or valve
+  double from_s = 0.0;  // after the plant's start
   double for_s = 0.0;
-  double value = 0.0;                // delay: s
+  double value = 0.0;  // delay: s
 };
 
 struct PlantTruth {
   std::string name;
   std::string machine_id;
-  std::uint64_t seed = 1;            // of everything random while it runs
+  std::uint64_t seed = 1;  // of everything random while it runs
 
   double main_link_length_mm = 0.0;
   double attach_length_mm = 0.0;
@@ -120,14 +120,14 @@ struct PlantTruth {
   PlanarPose X_DH;
   PlanarPose X_EW;
   JetStackTruth stack;
-  double jet_wander_mm = 0.0;        // one sigma, each coordinate
+  double jet_wander_mm = 0.0;  // one sigma, each coordinate
   double jet_wander_time_s = 0.5;
   double jet_lag_time_s = 0.0;
   ValveTruth jet_valve;
   ValveTruth abrasive_valve;
   PumpTruth pump;
   CameraTruth camera;
-  std::vector<SheetMark> marks;      // where they truly are
+  std::vector<SheetMark> marks;  // where they truly are
   std::vector<Fault> faults;
 
   Eigen::Vector2d jet_offset_H_mm() const {

@@ -20,7 +20,8 @@ std::optional<PlanarPose> SheetTruthHistory::PoseAt(std::int64_t time_ns) const 
     }
     const SheetSample& b = ring_[(count_ - back + 1) % ring_.size()];
     const double u = static_cast<double>(time_ns - a.time_ns) / static_cast<double>(b.time_ns - a.time_ns);
-    return PlanarPose{a.X_DW.x_mm + u * (b.X_DW.x_mm - a.X_DW.x_mm), a.X_DW.y_mm + u * (b.X_DW.y_mm - a.X_DW.y_mm),
+    return PlanarPose{a.X_DW.x_mm + u * (b.X_DW.x_mm - a.X_DW.x_mm),
+                      a.X_DW.y_mm + u * (b.X_DW.y_mm - a.X_DW.y_mm),
                       a.X_DW.theta_rad + u * (b.X_DW.theta_rad - a.X_DW.theta_rad)};
   }
   return std::nullopt;

@@ -36,7 +36,9 @@ class SheetTruthHistory final : public SheetTruthSource {
       ring_[count_++ % ring_.size()] = sample;
     }
   }
-  std::int64_t newest_ns() const override { return count_ == 0 ? 0 : ring_[(count_ - 1) % ring_.size()].time_ns; }
+  std::int64_t newest_ns() const override {
+    return count_ == 0 ? 0 : ring_[(count_ - 1) % ring_.size()].time_ns;
+  }
   std::optional<PlanarPose> PoseAt(std::int64_t time_ns) const override;
 
  private:

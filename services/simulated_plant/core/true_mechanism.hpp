@@ -15,7 +15,8 @@
 namespace lambdajet::simulated_plant {
 
 // reading_mm: what the encoders would say, without step and sub-division error. Nothing where the links do not meet.
-std::optional<Eigen::Vector2d> TruePoint(const PlantTruth& truth, const std::array<double, kActuatorCount>& reading_mm);
+std::optional<Eigen::Vector2d> TruePoint(const PlantTruth& truth,
+                                         const std::array<double, kActuatorCount>& reading_mm);
 
 double ValueOf(const Wave& wave, double x_mm);
 
