@@ -1,0 +1,207 @@
+#include "trajectory/core/feed/run_profile.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "trajectory/core/feed/reach.hpp"
+
+namespace lambdajet::trajectory {
+namespace {
+
+using Eigen::Vector2d;
+
+constexpr double kLongestCell_mm = 1.0;
+constexpr double kShortestCell_mm = 0.1;
+constexpr double kCellOfRadius = 0.1;
+constexpr double kKinkNode_rad = 0.02;     // a kink above this has a node of its own
+constexpr double kTurningWindow_mm = 0.5;  // either side
+constexpr double kSmoothKink_rad = 0.35;   // kinks below this count as curvature of a polygon
+constexpr int kFewestCells = 4;
+
+struct Kink {
+  double offset_mm;
+  double turning;  // prefix sum of signed small turnings up to and with this kink
+};
+
+class NodeBuilder {
+ public:
+  NodeBuilder(const PlanningModel& model, const PathElement& run, std::vector<ProgramFault>& faults)
+      : model_(model), run_(run), faults_(faults) {}
+
+  std::vector<ProfileNode> Build() {
+    const double total = run_.length_mm();
+    longest_ = std::min(kLongestCell_mm, total / kFewestCells);
+    shortest_ = std::min(kShortestCell_mm, 0.5 * longest_);
+    AddNode(0, 0.0, model_.machine.path.feed_mm_per_s, FeedLimit::kFeed);
+    for (std::size_t i = 0; i < run_.pieces.size() && faults_.empty(); ++i) {
+      Inside(i);
+      Join(i, total);
+    }
+    AddPolygonCurvature();
+    return std::move(nodes_);
+  }
+
+ private:
+  // Nodes strictly inside a piece.
+  void Inside(std::size_t i) {
+    const PathPiece& piece = run_.pieces[i];
+    double cell = longest_;
+    if (piece.radius_mm != 0.0) {
+      cell = std::clamp(kCellOfRadius * std::abs(piece.radius_mm), shortest_, longest_);
+    }
+    if (piece.length_mm < 2.0 * shortest_) {
+      return;
+    }
+    const int count = static_cast<int>(std::ceil(piece.length_mm / cell));
+    for (int k = 1; k < count && faults_.empty(); ++k) {
+      AddNode(i, piece.length_mm * k / count, piece.feed_mm_per_s, FeedLimit::kFeed);
+    }
+  }
+
+  // The place between piece i and the next, or the end.
+  void Join(std::size_t i, double total) {
+    const PathPiece& piece = run_.pieces[i];
+    const double here = piece.begin_mm + piece.length_mm;
+    if (i + 1 == run_.pieces.size()) {
+      AddNode(i, piece.length_mm, piece.feed_mm_per_s, FeedLimit::kFeed);
+      nodes_.back().offset_mm = total;
+      return;
+    }
+    const PathPiece& next = run_.pieces[i + 1];
+    const Vector2d u = PointOn(piece, piece.length_mm).tangent;
+    const Vector2d v = PointOn(next, 0.0).tangent;
+    const double angle = std::atan2(u.x() * v.y() - u.y() * v.x(), u.dot(v));
+    if (std::abs(angle) < kSmoothKink_rad && std::abs(angle) > 1e-9) {
+      turning_ += angle;
+      kinks_.push_back({here, turning_});
+    }
+    double speed = std::min(piece.feed_mm_per_s, next.feed_mm_per_s);
+    FeedLimit reason = FeedLimit::kFeed;
+    LimitKink(std::abs(angle), std::min(piece.tolerance_mm, next.tolerance_mm), speed, reason);
+    const bool own = std::abs(angle) > kKinkNode_rad;
+    if (own || here - nodes_.back().offset_mm >= shortest_) {
+      if (own && here - nodes_.back().offset_mm < 0.5 * shortest_ && nodes_.size() > 1) {
+        LowerCap(nodes_.back(), speed, reason);
+        return;
+      }
+      AddNode(i + 1, 0.0, speed, reason);
+      // The incoming piece's curvature holds up to here.
+      nodes_.back().curvature =
+          std::max(nodes_.back().curvature, std::abs(piece.curvature()) * model_.overshoot);
+    } else {
+      LowerCap(nodes_.back(), speed, reason);
+    }
+  }
+
+  static void LowerCap(ProfileNode& node, double speed, FeedLimit reason) {
+    if (speed < node.speed_cap_mm_per_s) {
+      node.speed_cap_mm_per_s = speed;
+      node.cap_reason = reason;
+    }
+  }
+
+  void LimitKink(double angle, double tolerance_mm, double& speed, FeedLimit& reason) const {
+    const double change = 2.0 * std::sin(0.5 * angle);  // of velocity, per speed
+    if (change < 1e-9) {
+      return;
+    }
+    const auto lower = [&](double limit, FeedLimit why) {
+      if (limit < speed) {
+        speed = limit;
+        reason = why;
+      }
+    };
+    const double sigma = std::sqrt(model_.filter.variance_s2());
+    lower(0.9 * tolerance_mm / (model_.filter.kink_deviation_s() * change), FeedLimit::kCorner);
+    if (angle > 0.1) {
+      lower(1.8 * model_.path_acceleration_mm_per_s2 * sigma / change, FeedLimit::kCorner);
+    }
+    const double lag = model_.options.compensate ? model_.machine.process.jet_lag_time_s : 0.0;
+    if (lag > 0.0) {
+      lower(4.0 * model_.options.tolerance_mm / (lag * change), FeedLimit::kPredictedError);
+    }
+  }
+
+  void AddNode(std::size_t i, double offset_mm, double speed, FeedLimit reason) {
+    const PathPiece& piece = run_.pieces[i];
+    ProfileNode node;
+    node.offset_mm = piece.begin_mm + offset_mm;
+    node.speed_cap_mm_per_s = std::min(speed, piece.feed_mm_per_s);
+    node.cap_reason = reason;
+    node.curvature = std::abs(piece.curvature()) * model_.overshoot;
+    node.acceleration_mm_per_s2 = model_.path_acceleration_mm_per_s2;
+    LimitLag(piece, node);
+    SetActuators(piece, offset_mm, node);
+    nodes_.push_back(node);
+  }
+
+  // The cut front trails by v T; on an arc that pulls it inwards by (v T)^2 / (2 R).
+  void LimitLag(const PathPiece& piece, ProfileNode& node) const {
+    const double lag = model_.options.compensate ? model_.machine.process.jet_lag_time_s : 0.0;
+    if (lag > 0.0 && piece.radius_mm != 0.0) {
+      LowerCap(node, std::sqrt(2.0 * std::abs(piece.radius_mm) * model_.options.tolerance_mm) / lag,
+               FeedLimit::kPredictedError);
+    }
+  }
+
+  void SetActuators(const PathPiece& piece, double offset_mm, ProfileNode& node) {
+    const PathPoint point = PointOn(piece, offset_mm);
+    const Vector2d normal{-point.tangent.y(), point.tangent.x()};
+    const kinematics::MotionAnswer answer =
+        model_.sheet.Actuators({point.p_mm, point.tangent, piece.curvature() * normal});
+    if (answer.reason != kinematics::Reason::kSolved || !answer.differentiable) {
+      faults_.push_back(ReachFault(model_.sheet, point.p_mm, piece.line));
+      return;
+    }
+    for (int j = 0; j < 2; ++j) {
+      node.A[static_cast<std::size_t>(j)] = answer.motion.velocity_mm_per_s[j];
+      node.B[static_cast<std::size_t>(j)] = answer.motion.acceleration_mm_per_s2[j];
+    }
+  }
+
+  // Polygons of short blocks: net turning within the window, as curvature.
+  void AddPolygonCurvature() {
+    if (kinks_.empty()) {
+      return;
+    }
+    std::size_t from = 0, to = 0;
+    for (ProfileNode& node : nodes_) {
+      while (to < kinks_.size() && kinks_[to].offset_mm <= node.offset_mm + kTurningWindow_mm) {
+        ++to;
+      }
+      while (from < to && kinks_[from].offset_mm < node.offset_mm - kTurningWindow_mm) {
+        ++from;
+      }
+      if (to > from) {
+        const double before = from > 0 ? kinks_[from - 1].turning : 0.0;
+        const double turning = kinks_[to - 1].turning - before;
+        const double curvature = std::abs(turning) / (2.0 * kTurningWindow_mm);
+        node.curvature += curvature * model_.overshoot;
+        const double lag = model_.options.compensate ? model_.machine.process.jet_lag_time_s : 0.0;
+        if (lag > 0.0 && curvature > 0.0) {
+          LowerCap(node, std::sqrt(2.0 * model_.options.tolerance_mm / curvature) / lag,
+                   FeedLimit::kPredictedError);
+        }
+      }
+    }
+  }
+
+  const PlanningModel& model_;
+  const PathElement& run_;
+  std::vector<ProgramFault>& faults_;
+  std::vector<ProfileNode> nodes_;
+  std::vector<Kink> kinks_;
+  double turning_ = 0.0;
+  double longest_ = kLongestCell_mm;
+  double shortest_ = kShortestCell_mm;
+};
+
+}  // namespace
+
+std::vector<ProfileNode> MakeRunNodes(const PlanningModel& model, const PathElement& run,
+                                      std::vector<ProgramFault>& faults) {
+  return NodeBuilder(model, run, faults).Build();
+}
+
+}  // namespace lambdajet::trajectory

@@ -1,0 +1,52 @@
+// Smooths a motion sampled in time so that its jerk is bounded, without leaving the contour.
+//
+// Model: symmetric moving averages of T1 and T2 over samples a knot apart, then a uniform quintic B-spline with the averaged
+// samples as control points: the motion is four times continuously differentiable, and every average keeps what is convex
+// (speed, magnitude of acceleration). An average pulls an arc inwards by sigma^2/2 of its normal acceleration, sigma^2 the
+// kernel's variance; that much is added outwards first (only along the normal, so that path length stays monotone).
+// What is left is of fourth order on arcs, and shows at kinks and junctions; the planner measures it.
+// Units: mm, s. Shapes: samples one a knot, `reach()` samples of rest before and after. Threads: values.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <vector>
+
+namespace lambdajet::trajectory {
+
+using PathSample = Eigen::Vector3d;  // x, y, path length
+
+struct SmoothingFilter {
+  double knot_s = 0.002;
+  int first_width = 1;  // samples, odd
+  int second_width = 1;
+
+  static SmoothingFilter ForLimits(double knot_s, double acceleration_mm_per_s2, double jerk_mm_per_s3);
+
+  double variance_s2() const;
+  int reach() const {
+    return first_width / 2 + second_width / 2 + 3;
+  }  // samples either side that a value depends on
+  double half_support_s() const { return (reach() + 0.5) * knot_s; }
+  // Peak of the answer to a unit step in normal acceleration; above 1 because of the outward correction.
+  double overshoot() const;
+  // Largest distance from a right-angled kink crossed at 1 mm/s velocity change, in s.
+  double kink_deviation_s() const;
+};
+
+// Value and four derivatives at a knot.
+struct KnotState {
+  PathSample r = PathSample::Zero();
+  PathSample first = PathSample::Zero();
+  PathSample second = PathSample::Zero();
+  PathSample third = PathSample::Zero();
+  PathSample fourth = PathSample::Zero();
+};
+
+// The control points of the smoothed motion; same count as `samples`.
+std::vector<PathSample> Smooth(const SmoothingFilter& filter, const std::vector<PathSample>& samples);
+
+// The spline at control point `index`; needs two neighbours either side.
+KnotState EvaluateKnot(const std::vector<PathSample>& control, std::size_t index, double knot_s);
+
+}  // namespace lambdajet::trajectory

@@ -1,0 +1,59 @@
+// Finds the fastest speed along a path under bounds on speed, on the magnitude of acceleration and on the actuators.
+//
+// Model: time-optimal path parametrisation in the phase plane (s, x = s'^2) on a grid, acceleration u = s'' constant over a
+// cell: a backward pass gives the largest x from which the rest of the path can still be run, a forward pass takes the
+// largest step below it. Path: u^2 + (k x)^2 <= a^2, k the curvature with the smoothing's overshoot; actuator j:
+// |A_j u + B_j x| <= a_j, |A_j| sqrt(x) <= v_j, where q_j' = A_j s', q_j'' = A_j s'' + B_j s'^2.
+// Units: mm, s. Shapes: one node a grid point, cell i from node i to i + 1. Threads: pure. Cost: a few tens of ns a node.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string_view>
+#include <vector>
+
+namespace lambdajet::trajectory {
+
+enum class FeedLimit : std::uint8_t {
+  kFeed,
+  kCurvature,
+  kCorner,
+  kPathAcceleration,
+  kActuator1Velocity,
+  kActuator2Velocity,
+  kActuator1Acceleration,
+  kActuator2Acceleration,
+  kContourTolerance,
+  kPredictedError,
+  kActuatorJerk
+};
+inline constexpr std::size_t kFeedLimitCount = 11;
+
+// UPPER_SNAKE.
+std::string_view FeedLimitName(FeedLimit limit);
+
+struct ProfileNode {
+  double offset_mm = 0.0;
+  double speed_cap_mm_per_s = 0.0;      // feed, corner, predicted error, slow-down
+  double curvature = 0.0;               // magnitude, with the smoothing's overshoot
+  double acceleration_mm_per_s2 = 0.0;  // path limit here
+  std::array<double, 2> A{};
+  std::array<double, 2> B{};
+  double x = 0.0;  // answer: speed squared
+  FeedLimit cap_reason = FeedLimit::kFeed;
+  FeedLimit binding = FeedLimit::kFeed;  // answer
+};
+
+struct ActuatorBounds {
+  std::array<double, 2> velocity_mm_per_s{};
+  std::array<double, 2> acceleration_mm_per_s2{};
+};
+
+// Fills x and binding of every node; begins and ends at the given speeds at most.
+void SolveSpeedProfile(std::vector<ProfileNode>& nodes, const ActuatorBounds& bounds,
+                       double begin_speed_mm_per_s, double end_speed_mm_per_s);
+
+// Time to run the profile.
+double ProfileDuration(const std::vector<ProfileNode>& nodes);
+
+}  // namespace lambdajet::trajectory

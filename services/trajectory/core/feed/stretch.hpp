@@ -1,0 +1,69 @@
+// Plans one stretch of motion, from standstill to standstill: runs and idle moves in sequence.
+//
+// Model: as told in feed/plan_program.hpp. Frames: W. Units: mm, s. Threads: one object a thread.
+// Cost: linear in path length and time; a few passes. Errors: faults with line and reason.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "trajectory/core/feed/plan_program.hpp"
+#include "trajectory/core/feed/program_path.hpp"
+#include "trajectory/core/feed/sheet_motion.hpp"
+#include "trajectory/core/feed/smoothing.hpp"
+#include "trajectory/core/feed/speed_profile.hpp"
+#include "trajectory/core/idle_motion/idle_law.hpp"
+
+namespace lambdajet::trajectory {
+
+// What every stretch of a program is planned with.
+struct PlanningModel {
+  explicit PlanningModel(const MachineDescription& machine, const PlanOptions& options);
+
+  const MachineDescription& machine;
+  const PlanOptions& options;
+  SheetMotion sheet;
+  SmoothingFilter filter;
+  double overshoot = 1.0;  // of the filter, on normal acceleration
+  double path_acceleration_mm_per_s2 = 0.0;
+  ActuatorBounds bounds;        // with planning margin
+  double elastic_lag_s2 = 0.0;  // 0: not compensated
+  double damping_time_s = 0.0;
+};
+
+struct IdleMove {
+  bool straight = true;  // trapezoid along the line; else one law a coordinate
+  double duration_s = 0.0;
+  double speed_mm_per_s = 0.0;  // trapezoid: cruise
+  double ramp_s = 0.0;
+  std::array<IdleLaw, 2> laws;
+  std::string_view name;
+  std::string_view reason;
+  double start_speed_mm_per_s = 0.0;
+  double peak_acceleration_mm_per_s2 = 0.0;
+};
+
+// Where the elements of a planned stretch lie in path length and how they were limited.
+struct ElementPlace {
+  double begin_s_mm = 0.0;
+  double end_s_mm = 0.0;
+};
+
+struct StretchPlan {
+  std::vector<Segment> segments;  // start_s counted from the stretch's begin
+  std::vector<PlanSample> samples;
+  std::vector<ElementPlace> places;  // one an element
+  std::vector<BindingLength> binding;
+  std::vector<SlowStretch> slow;
+  std::vector<IdleReport> idle;
+  std::vector<ProgramFault> faults;
+  double duration_s = 0.0;
+  double end_s_mm = 0.0;
+  double contour_deviation_mm = 0.0;
+};
+
+// `elements`: runs and idle moves without gates; may be empty: a rest at `at_W_mm` of one segment.
+StretchPlan PlanStretch(const PlanningModel& model, std::span<const PathElement> elements,
+                        const Eigen::Vector2d& at_W_mm, double begin_s_mm);
+
+}  // namespace lambdajet::trajectory

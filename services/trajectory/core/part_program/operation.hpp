@@ -1,0 +1,70 @@
+// Lists what a part program makes the machine do, in order, in millimetres and seconds, with the line each comes from.
+//
+// Model: the canonical operations of RS-274/NGC as far as a jet that stands still and a sheet that moves have them; units,
+// distance modes, offsets and scaling of the program are resolved, so that every coordinate is in W.
+// Frames: W. Units: mm, mm/s, s, rad. Threads: values. Cost: 80 bytes an operation.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace lambdajet::trajectory {
+
+enum class OperationKind : std::uint8_t {
+  kTraverse,  // jet-off move, its shape is the planner's
+  kFeedLine,
+  kFeedArc,
+  kDwell,    // value: s
+  kPierce,   // value: s, 0: the machine's own pierce time; jet and abrasive on at its end
+  kMeasure,  // value: id of the mark
+  kStop,     // M0, M1: until the operator goes on
+  kJetOn,    // from here to kCameraTrackOff: on the fly, keyed to path length
+  kJetOff,
+  kAbrasiveOn,
+  kAbrasiveOff,
+  kCameraTrackOn,  // value: id of the mark
+  kCameraTrackOff,
+  kFeedChange,        // feed_mm_per_s
+  kUnitsChange,       // value: mm a unit
+  kDistanceChange,    // value: 90 or 91
+  kWorkOffsetChange,  // value: 54 … 59.3; x, y: the offset
+  kPathTolerance,     // value: mm; 0: visit every corner exactly (G61)
+  kEnd,
+};
+
+// UPPER_SNAKE.
+std::string_view OperationName(OperationKind kind);
+
+struct Operation {
+  OperationKind kind = OperationKind::kEnd;
+  std::uint32_t line = 0;  // of the program, 1 is the first
+  double x_W_mm = 0.0;     // end of a motion
+  double y_W_mm = 0.0;
+  double center_x_W_mm = 0.0;  // arc
+  double center_y_W_mm = 0.0;
+  double sweep_rad = 0.0;      // arc: counter-clockwise positive
+  double feed_mm_per_s = 0.0;  // feed line, arc and change
+  double value = 0.0;
+};
+
+// Something in a program that is not understood or cannot be done.
+struct ProgramFault {
+  std::uint32_t line = 0;
+  std::uint32_t column = 0;  // 1 is the first; 0: the whole line
+  std::string_view reason;   // UPPER_SNAKE, a literal
+  std::string word;          // as written
+  std::string message;       // what is wrong, and what would be right
+};
+
+struct PartProgram {
+  std::vector<Operation> operations;  // valid only if there are no faults
+  std::vector<ProgramFault> faults;
+  std::uint32_t line_count = 0;
+};
+
+// One line for people and files: "12 FEED_LINE x=10 y=20 feed=50".
+std::string FormatOperation(const Operation& operation);
+
+}  // namespace lambdajet::trajectory
