@@ -288,8 +288,8 @@ double SliderDeviation(const DrawnMachine& m, const ContourModel::Point& point) 
 }  // namespace
 
 std::string_view Name(PredictionReason reason) {
-  constexpr std::array<std::string_view, 7> kNames = {"UNKNOWN",      "PREDICTED",   "NO_CUTTING", "NOT_FINITE",
-                                                      "OUT_OF_ORDER", "UNREACHABLE", "CANCELLED"};
+  constexpr std::array<std::string_view, 7> kNames = {
+      "UNKNOWN", "PREDICTED", "NO_CUTTING", "NOT_FINITE", "OUT_OF_ORDER", "UNREACHABLE", "CANCELLED"};
   const auto i = static_cast<std::size_t>(reason);
   return i < kNames.size() ? kNames[i] : kNames[0];
 }

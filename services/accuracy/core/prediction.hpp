@@ -36,8 +36,8 @@ inline constexpr int kMostDraws = 100000;
 struct PredictionOptions {
   int draws = 400;  // 0: linear only
   std::uint64_t seed = 1;
-  int points = 600;           // of the contour, at most
-  double tolerance_mm = 0.0;  // for the probability of conformity; 0: not asked
+  int points = 600;                      // of the contour, at most
+  double tolerance_mm = 0.0;             // for the probability of conformity; 0: not asked
   std::function<bool()> cancelled = {};  // asked before each draw
 };
 
@@ -45,7 +45,7 @@ enum class PredictionReason : std::uint8_t {
   kPredicted = 1,
   kNoCutting = 2,  // no sample with the jet on moves
   kNotFinite = 3,
-  kOutOfOrder = 4,  // tau goes back
+  kOutOfOrder = 4,   // tau goes back
   kUnreachable = 5,  // the mechanism cannot stand at `blame_line`
   kCancelled = 6
 };

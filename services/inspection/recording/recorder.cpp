@@ -57,6 +57,11 @@ void Recorder::CountLost(std::uint64_t batches) {
 
 void Recorder::Begin(std::uint64_t plan, std::span<const std::uint64_t> further_plans) {
   const std::lock_guard lock(mutex_);
+  Recording* known = Named(plan);
+  if (known != nullptr && known->open && !further_plans.empty()) {
+    known->plans.insert(known->plans.end(), further_plans.begin(), further_plans.end());
+    return;
+  }
   std::erase_if(recordings_, [plan](const Recording& r) { return r.plan == plan; });
   if (recordings_.size() == kMostRecordings) {
     recordings_.pop_front();

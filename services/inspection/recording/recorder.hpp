@@ -35,6 +35,7 @@ struct RecordingSize {
 
 class Recorder {
  public:
+  // Anew; or, with further plans while the recording is open, these are added to it and nothing is forgotten.
   void Begin(std::uint64_t plan, std::span<const std::uint64_t> further_plans);
   absl::StatusOr<RecordingSize> End(std::uint64_t plan);
 
