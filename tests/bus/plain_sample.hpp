@@ -1,10 +1,9 @@
 // A sample for tests of the bus itself: a number and a few bytes, serialised by hand, so that they need no IDL.
 #pragma once
 
-#include <fastdds/dds/topic/TopicDataType.hpp>
-
 #include <cstdint>
 #include <cstring>
+#include <fastdds/dds/topic/TopicDataType.hpp>
 #include <vector>
 
 namespace lambdajet::test {
@@ -45,7 +44,8 @@ class PlainSamplePubSubType : public eprosima::fastdds::dds::TopicDataType {
     return true;
   }
   std::function<std::uint32_t()> getSerializedSizeProvider(void* sample) override {
-    return [sample] { return 16 + static_cast<std::uint32_t>(static_cast<PlainSample*>(sample)->bytes.size()); };
+    return
+        [sample] { return 16 + static_cast<std::uint32_t>(static_cast<PlainSample*>(sample)->bytes.size()); };
   }
   void* createData() override { return new PlainSample; }
   void deleteData(void* sample) override { delete static_cast<PlainSample*>(sample); }

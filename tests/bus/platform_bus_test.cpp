@@ -175,7 +175,9 @@ TEST_F(Bus, RefusesTheWriteOfAFullHistoryAtOnce) {
   EXPECT_EQ(taken, 512);  // deploy/dds/profiles.xml
   EXPECT_LT(longest, std::chrono::milliseconds(90)) << "default max_blocking_time is 100 ms";
   there->SetFaults({});
-  EXPECT_TRUE(Eventually([&] { return writer.Write({2, {}}); })) << "takes samples again when they are acknowledged";
+  EXPECT_TRUE(Eventually([&] {
+    return writer.Write({2, {}});
+  })) << "takes samples again when they are acknowledged";
 }
 
 TEST_F(Bus, DeliversAllOfASetpointStreamOverALossyLink) {

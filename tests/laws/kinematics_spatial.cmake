@@ -1,1 +1,2 @@
 lambdajet_check(laws_kinematics_hexapod LABELS laws TIMEOUT 300 SOURCES kinematics_hexapod_test.cpp DEPS kinematics_spatial)
+lambdajet_check(laws_kinematics_hexapod_workspace LABELS laws SOURCES kinematics_hexapod_workspace_test.cpp DEPS kinematics_spatial)

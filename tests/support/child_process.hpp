@@ -14,10 +14,10 @@ std::string BinDir();
 std::string SourceDir();
 
 struct ChildOptions {
-  std::string program;                              // a name in LAMBDAJET_BIN_DIR, or a path with a '/'
+  std::string program;  // a name in LAMBDAJET_BIN_DIR, or a path with a '/'
   std::vector<std::string> arguments;
-  std::map<std::string, std::string> environment;   // added to the test's own
-  std::string announce_file;                        // if set, --announce_file=… is added and the file removed first
+  std::map<std::string, std::string> environment;  // added to the test's own
+  std::string announce_file;  // if set, --announce_file=… is added and the file removed first
 };
 
 // What a house writes to its announce file when it is ready.
@@ -40,12 +40,12 @@ class ChildProcess {
   // Nothing if the child ended or the time passed before the announce file was complete.
   std::optional<Announcement> WaitUntilReady(std::chrono::milliseconds patience = std::chrono::seconds(20));
 
-  void Signal(int number);                    // SIGTERM, SIGKILL, SIGSTOP, …
+  void Signal(int number);  // SIGTERM, SIGKILL, SIGSTOP, …
 
   // The exit code, 128 + signal if it was killed, nothing if it still runs after the time.
   std::optional<int> WaitForExit(std::chrono::milliseconds patience = std::chrono::seconds(20));
 
-  std::string out() const;                    // what it has written so far
+  std::string out() const;  // what it has written so far
   std::string err() const;
 
  private:

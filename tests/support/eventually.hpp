@@ -6,7 +6,8 @@
 
 namespace lambdajet::test {
 
-inline constexpr std::chrono::seconds kPatience{20};  // far above what anything takes; reached only on failure
+inline constexpr std::chrono::seconds kPatience{
+    20};  // far above what anything takes; reached only on failure
 
 template <typename Condition>
 bool Eventually(Condition&& condition, std::chrono::milliseconds patience = kPatience) {

@@ -133,7 +133,7 @@ INSTANTIATE_TEST_SUITE_P(
     ::testing::Values(
         BadFile{"  feed_mm_per_s: 120", "  fed_mm_per_s: 120", "MISSING", "feed_mm_per_s"},
         BadFile{"  rapid_mm_per_s: 300", "  rapid_mm_per_s: 300\n  rapid_mm_per_s: 300", "DUPLICATE",
-                "rapid_mm_per_s"},
+                "rapid_mm_per_s", 1},
         BadFile{"control_period_s: 0.001", "control_period_s: fast", "WRONG_VALUE", "finite number in s"},
         BadFile{"  kerf_width_mm: 0.8", "  kerf_width_mm: .nan", "WRONG_VALUE", "finite number in mm"},
         BadFile{"  kerf_width_mm: 0.8", "  kerf_width_mm: -0.8", "WRONG_VALUE",

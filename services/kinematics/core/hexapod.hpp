@@ -19,15 +19,18 @@
 #include <string_view>
 
 #include "foundation/geometry/pose.hpp"
+#include "foundation/machine/hexapod_geometry.hpp"
 #include "kinematics/core/hexapod_kernel.hpp"
 #include "kinematics/core/reason.hpp"
 #include "kinematics/core/universal_joint.hpp"
 
 namespace lambdajet::kinematics {
 
-inline constexpr int kStruts = 6;
-using StrutVector = Eigen::Matrix<double, kStruts, 1>;
-using StrutPoints = Eigen::Matrix<double, 3, kStruts>;
+using lambdajet::HexapodGeometry;
+using lambdajet::HexapodLimits;
+using lambdajet::kStruts;
+using lambdajet::StrutPoints;
+using lambdajet::StrutVector;
 
 // C in M and the Krylov angles of equation (1).
 struct PlatformPose {
@@ -45,42 +48,9 @@ struct PlatformPose {
   }
 };
 
-struct HexapodLimits {
-  double strut_min_mm = 0.0;
-  double strut_max_mm = std::numeric_limits<double>::infinity();
-  double base_cone_rad = 3.15;      // of a strut against its direction at home, seen from the base
-  double platform_cone_rad = 3.15;  // the same, seen from the platform
-  double singular_margin =
-      0.0;  // smallest singular value that is still served, mm/mm (hexapod_singularity.hpp)
-};
-
-struct HexapodGeometry {
-  StrutPoints p_MA_mm = StrutPoints::Zero();
-  StrutPoints p_PB_mm = StrutPoints::Zero();
-  StrutVector length_zero_mm = StrutVector::Zero();  // l0: actuator reading = L - l0
-  // Frames A_j of the base's joints, y along the fixed axis. They stay as they are when an identified A_j
-  // moves.
-  std::array<Eigen::Matrix3d, kStruts> R_MA = {Eigen::Matrix3d::Identity(), Eigen::Matrix3d::Identity(),
-                                               Eigen::Matrix3d::Identity(), Eigen::Matrix3d::Identity(),
-                                               Eigen::Matrix3d::Identity(), Eigen::Matrix3d::Identity()};
-  Pose X_MP_home;
-  Pose X_PT;  // the tool in the platform
-  double screw_lead_mm =
-      0.0;  // right-handed positive; 0: the strut cannot turn, or does not move when it does
-  HexapodLimits limits;
-  std::array<UniversalJoint, kStruts> joints{};  // all zero: ideal
-};
-
 // Which limit a pose is beyond.
 enum class HexapodBound { kNone, kStrutMin, kStrutMax, kBaseJointCone, kPlatformJointCone, kSingularMargin };
 std::string_view BoundName(HexapodBound bound);  // UPPER_SNAKE
-
-// Lays the joint frames as the nominal design has them: z along the strut at home, y = Z_M x z (Y_M if that
-// is nothing), x = y x z.
-void LayJointFrames(HexapodGeometry& geometry);
-
-// What is wrong with a geometry, first fault only; empty if nothing is.
-std::string_view FaultOf(const HexapodGeometry& geometry);
 
 // A geometry with what is prepared from it once.
 class Hexapod {

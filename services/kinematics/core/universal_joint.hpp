@@ -17,24 +17,12 @@
 #include <array>
 
 #include "foundation/geometry/pose.hpp"
+#include "foundation/machine/hexapod_geometry.hpp"
 
 namespace lambdajet::kinematics {
 
 class Hexapod;
-
-struct UniversalJoint {
-  double a1x_mm = 0.0;  // axis 1 off the nominal centre
-  double a1y_mm = 0.0;
-  double a1z_mm = 0.0;
-  double dx_rad = 0.0;  // direction of axis 1
-  double dz_rad = 0.0;
-  double ex_mm = 0.0;  // axis 2 off axis 1
-  double ez_mm = 0.0;
-  double eps_rad = 0.0;  // axes 1 and 2 off 90 deg
-  double h_mm = 0.0;     // the strut's axis off axis 2
-  double nu_rad = 0.0;   // the strut not square to axis 2
-  friend bool operator==(const UniversalJoint&, const UniversalJoint&) = default;
-};
+using lambdajet::UniversalJoint;
 
 // B_A of given angles and length, with the joint's deviations.
 Eigen::Vector3d StrutEnd(const UniversalJoint& joint, double q1_rad, double q2_rad, double length_mm);

@@ -21,15 +21,15 @@ struct LinkFaults {
 };
 
 struct BusOptions {
-  std::string house;                                   // name of the participant
-  std::string partition;                               // machine id
+  std::string house;      // name of the participant
+  std::string partition;  // machine id
   int domain = 42;
   std::vector<std::string> interfaces = {"127.0.0.1"};  // addresses or names (eth0) to use; empty: all
-  std::vector<std::string> initial_peers;              // hosts or addresses; empty: multicast, or this host if loopback
-  std::string key_file;                                // empty: no guard
-  bool allow_unguarded = false;                        // beyond loopback without a key
+  std::vector<std::string> initial_peers;  // hosts or addresses; empty: multicast, or this host if loopback
+  std::string key_file;                    // empty: no guard
+  bool allow_unguarded = false;            // beyond loopback without a key
   std::string profile_file = "deploy/dds/profiles.xml";
-  int peers_per_host = 16;                             // processes looked for on each initial peer
+  int peers_per_host = 16;  // processes looked for on each initial peer
   LinkFaults faults;
 };
 

@@ -29,8 +29,10 @@ class Mac {
     context_ = EVP_MAC_CTX_new(algorithm);
     EVP_MAC_free(algorithm);
     char digest[] = "SHA256";
-    const OSSL_PARAM parameters[] = {OSSL_PARAM_construct_utf8_string("digest", digest, 0), OSSL_PARAM_construct_end()};
-    Expects(EVP_MAC_init(context_, key.secret.data(), key.secret.size(), parameters) == 1, "HMAC-SHA256 starts");
+    const OSSL_PARAM parameters[] = {OSSL_PARAM_construct_utf8_string("digest", digest, 0),
+                                     OSSL_PARAM_construct_end()};
+    Expects(EVP_MAC_init(context_, key.secret.data(), key.secret.size(), parameters) == 1,
+            "HMAC-SHA256 starts");
   }
   ~Mac() { EVP_MAC_CTX_free(context_); }
   Mac(const Mac&) = delete;
@@ -66,7 +68,8 @@ std::uint64_t ReadLittleEndian(const std::uint8_t* bytes) {
 
 std::uint64_t DrawSender() {
   std::uint64_t sender = 0;
-  Expects(RAND_bytes(reinterpret_cast<unsigned char*>(&sender), sizeof sender) == 1, "the system has random numbers");
+  Expects(RAND_bytes(reinterpret_cast<unsigned char*>(&sender), sizeof sender) == 1,
+          "the system has random numbers");
   return sender;
 }
 
@@ -74,13 +77,20 @@ std::uint64_t DrawSender() {
 
 const char* GuardVerdictName(GuardVerdict verdict) {
   switch (verdict) {
-    case GuardVerdict::kAccepted: return "accepted";
-    case GuardVerdict::kTooShort: return "too_short";
-    case GuardVerdict::kBadVersion: return "bad_version";
-    case GuardVerdict::kUnknownKey: return "unknown_key";
-    case GuardVerdict::kBadTag: return "bad_tag";
-    case GuardVerdict::kReplayed: return "replayed";
-    case GuardVerdict::kCount: break;
+    case GuardVerdict::kAccepted:
+      return "accepted";
+    case GuardVerdict::kTooShort:
+      return "too_short";
+    case GuardVerdict::kBadVersion:
+      return "bad_version";
+    case GuardVerdict::kUnknownKey:
+      return "unknown_key";
+    case GuardVerdict::kBadTag:
+      return "bad_tag";
+    case GuardVerdict::kReplayed:
+      return "replayed";
+    case GuardVerdict::kCount:
+      break;
   }
   return "unknown";
 }

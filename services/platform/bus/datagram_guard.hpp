@@ -23,7 +23,15 @@ namespace lambdajet {
 
 inline constexpr std::size_t kGuardOverheadBytes = 34;
 
-enum class GuardVerdict : std::size_t { kAccepted, kTooShort, kBadVersion, kUnknownKey, kBadTag, kReplayed, kCount };
+enum class GuardVerdict : std::size_t {
+  kAccepted,
+  kTooShort,
+  kBadVersion,
+  kUnknownKey,
+  kBadTag,
+  kReplayed,
+  kCount
+};
 
 // The label of lambdajet_bus_guard_datagrams_total{verdict}.
 const char* GuardVerdictName(GuardVerdict verdict);

@@ -1,5 +1,7 @@
 #include "platform/bus/endpoint.hpp"
 
+#include <algorithm>
+#include <cstring>
 #include <fastdds/dds/core/LoanableSequence.hpp>
 #include <fastdds/dds/core/policy/QosPolicies.hpp>
 #include <fastdds/dds/publisher/DataWriter.hpp>
@@ -9,9 +11,6 @@
 #include <fastdds/dds/subscriber/DataReaderListener.hpp>
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
 #include <fastdds/dds/subscriber/qos/DataReaderQos.hpp>
-
-#include <algorithm>
-#include <cstring>
 
 #include "foundation/contract/trouble.hpp"
 #include "platform/bus/participant_inside.hpp"
@@ -36,12 +35,18 @@ Duration_t ToDuration(double seconds) {
 
 const char* PolicyName(dds::QosPolicyId_t id) {
   switch (id) {
-    case dds::DURABILITY_QOS_POLICY_ID: return "durability";
-    case dds::DEADLINE_QOS_POLICY_ID: return "deadline";
-    case dds::OWNERSHIP_QOS_POLICY_ID: return "ownership";
-    case dds::LIVELINESS_QOS_POLICY_ID: return "liveliness";
-    case dds::RELIABILITY_QOS_POLICY_ID: return "reliability";
-    default: return "another policy";
+    case dds::DURABILITY_QOS_POLICY_ID:
+      return "durability";
+    case dds::DEADLINE_QOS_POLICY_ID:
+      return "deadline";
+    case dds::OWNERSHIP_QOS_POLICY_ID:
+      return "ownership";
+    case dds::LIVELINESS_QOS_POLICY_ID:
+      return "liveliness";
+    case dds::RELIABILITY_QOS_POLICY_ID:
+      return "reliability";
+    default:
+      return "another policy";
   }
 }
 
@@ -54,7 +59,8 @@ absl::Status NoSuchProfile(const TopicSpec& topic) {
 
 absl::Status TypeConflict(const TopicSpec& topic) {
   return Trouble(absl::StatusCode::kInvalidArgument, "TOPIC_TYPE_CONFLICT",
-                 "topic " + topic.name + " is used in this process with another type", {{"topic", topic.name}});
+                 "topic " + topic.name + " is used in this process with another type",
+                 {{"topic", topic.name}});
 }
 
 absl::Status NoEndpoint(const TopicSpec& topic) {
@@ -66,7 +72,8 @@ absl::Status NoEndpoint(const TopicSpec& topic) {
 void TellIncompatible(Participant::Inside& bus, const TopicSpec& topic, const EndpointEvents& events,
                       dds::QosPolicyId_t policy) {
   if (bus.log != nullptr) {
-    bus.log->Warning("qos_incompatible", "another process uses this topic with other QoS, so no sample passes",
+    bus.log->Warning("qos_incompatible",
+                     "another process uses this topic with other QoS, so no sample passes",
                      {{"topic", topic.name}, {"policy", PolicyName(policy)}});
   }
   if (events.incompatible) {
@@ -83,8 +90,8 @@ class WriterCore::Inside : public dds::DataWriterListener {
     if (bus.metrics != nullptr) {
       written_ = bus.metrics->AddCounter("lambdajet_bus_samples_written_total", "Samples handed to the bus.",
                                          {{"topic", topic.name}});
-      refused_ = bus.metrics->AddCounter("lambdajet_bus_writes_refused_total", "Samples the bus did not take.",
-                                         {{"topic", topic.name}});
+      refused_ = bus.metrics->AddCounter("lambdajet_bus_writes_refused_total",
+                                         "Samples the bus did not take.", {{"topic", topic.name}});
     }
   }
   ~Inside() override {
@@ -114,7 +121,8 @@ class WriterCore::Inside : public dds::DataWriterListener {
   }
 
   bool Write(const void* sample) {
-    const bool taken = writer_->write(const_cast<void*>(sample));  // 2.9.1 takes a plain pointer and only reads
+    const bool taken =
+        writer_->write(const_cast<void*>(sample));  // 2.9.1 takes a plain pointer and only reads
     (taken ? written_ : refused_).Increment();
     return taken;
   }
@@ -125,7 +133,8 @@ class WriterCore::Inside : public dds::DataWriterListener {
       events_.matched(status.current_count);
     }
   }
-  void on_offered_incompatible_qos(dds::DataWriter*, const dds::OfferedIncompatibleQosStatus& status) override {
+  void on_offered_incompatible_qos(dds::DataWriter*,
+                                   const dds::OfferedIncompatibleQosStatus& status) override {
     TellIncompatible(bus_, spec_, events_, status.last_policy_id);
   }
 
@@ -149,7 +158,8 @@ WriterCore::WriterCore() = default;
 WriterCore::~WriterCore() = default;
 
 absl::StatusOr<std::unique_ptr<WriterCore>> WriterCore::Open(Participant& participant, const TopicSpec& topic,
-                                                             dds::TopicDataType* type, EndpointEvents events) {
+                                                             dds::TopicDataType* type,
+                                                             EndpointEvents events) {
   const dds::TypeSupport support(type);
   std::unique_ptr<WriterCore> core(new WriterCore);
   core->inside_ = std::make_unique<Inside>(participant.inside(), topic, std::move(events));
@@ -170,8 +180,10 @@ class ReaderCore::Inside : public dds::DataReaderListener {
     if (bus.metrics != nullptr) {
       const MetricLabels labels{{"topic", topic.name}};
       read_ = bus.metrics->AddCounter("lambdajet_bus_samples_read_total", "Samples that arrived.", labels);
-      lost_ = bus.metrics->AddCounter("lambdajet_bus_samples_lost_total", "Samples known to be missing.", labels);
-      missed_ = bus.metrics->AddCounter("lambdajet_bus_deadlines_missed_total", "Deadlines no sample kept.", labels);
+      lost_ =
+          bus.metrics->AddCounter("lambdajet_bus_samples_lost_total", "Samples known to be missing.", labels);
+      missed_ = bus.metrics->AddCounter("lambdajet_bus_deadlines_missed_total", "Deadlines no sample kept.",
+                                        labels);
     }
   }
   ~Inside() override {
@@ -235,13 +247,15 @@ class ReaderCore::Inside : public dds::DataReaderListener {
       events_.deadline_missed();
     }
   }
-  void on_liveliness_changed(dds::DataReader*, const eprosima::fastrtps::LivelinessChangedStatus& status) override {
+  void on_liveliness_changed(dds::DataReader*,
+                             const eprosima::fastrtps::LivelinessChangedStatus& status) override {
     alive_.store(status.alive_count);
     if (events_.liveliness_changed) {
       events_.liveliness_changed(status.alive_count);
     }
   }
-  void on_requested_incompatible_qos(dds::DataReader*, const dds::RequestedIncompatibleQosStatus& status) override {
+  void on_requested_incompatible_qos(dds::DataReader*,
+                                     const dds::RequestedIncompatibleQosStatus& status) override {
     TellIncompatible(bus_, spec_, events_, status.last_policy_id);
   }
   void on_sample_lost(dds::DataReader*, const dds::SampleLostStatus& status) override {

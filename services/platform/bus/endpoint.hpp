@@ -19,9 +19,9 @@ namespace lambdajet {
 // Which topic, and how. The name on the wire is `name` + "/" + `schema_hash`, so two builds that mean different things
 // by one name never match.
 struct TopicSpec {
-  std::string name;          // logical, as "drive/state"; a constant of the IDL
-  std::string schema_hash;   // lambdajet::idl::schema::k_…, from the IDL's .schema.hpp
-  std::string profile;       // state, setpoint, command, description or event (deploy/dds/profiles.xml)
+  std::string name;         // logical, as "drive/state"; a constant of the IDL
+  std::string schema_hash;  // lambdajet::idl::schema::k_…, from the IDL's .schema.hpp
+  std::string profile;      // state, setpoint, command, description or event (deploy/dds/profiles.xml)
   // Longest time between two samples, from the house's settings: the writer promises it, the reader is told when it is
   // not kept. At least 5 ms; a reader matches only writers that promise at least as much.
   std::optional<double> deadline_s = std::nullopt;
@@ -29,16 +29,16 @@ struct TopicSpec {
 
 // What a house may want to be told, on a thread of the bus: hand over and return. Each may be empty.
 struct EndpointEvents {
-  std::function<void(int matched)> matched = {};             // other ends matched now
-  std::function<void()> deadline_missed = {};                // reader: no sample for deadline_s
-  std::function<void(int alive)> liveliness_changed = {};    // reader: writers alive now
+  std::function<void(int matched)> matched = {};                     // other ends matched now
+  std::function<void()> deadline_missed = {};                        // reader: no sample for deadline_s
+  std::function<void(int alive)> liveliness_changed = {};            // reader: writers alive now
   std::function<void(const std::string& policy)> incompatible = {};  // another end offers or asks other QoS
 };
 
 // What a reader knows of a sample beside its content.
 struct Arrival {
-  std::int64_t monotonic_ns = 0;    // CLOCK_MONOTONIC when the reader handed it over
-  std::uint64_t writer = 0;         // tells writers apart
+  std::int64_t monotonic_ns = 0;  // CLOCK_MONOTONIC when the reader handed it over
+  std::uint64_t writer = 0;       // tells writers apart
 };
 
 class WriterCore {

@@ -26,7 +26,8 @@ bool ParseHex(const std::string& text, std::vector<std::uint8_t>& bytes) {
 absl::Status BadLine(const std::string& path, int line) {
   return Trouble(absl::StatusCode::kInvalidArgument, "BAD_KEY_FILE",
                  path + ":" + std::to_string(line) +
-                     ": must be a key id from 0 to 255 and at least 32 bytes in hex, with no id twice and at most 8 keys");
+                     ": must be a key id from 0 to 255 and at least 32 bytes in hex, with no id twice and at "
+                     "most 8 keys");
 }
 
 }  // namespace

@@ -72,14 +72,14 @@ class LateDelivery {
     }
   }
 
-  void Add(rtps::TransportReceiverInterface* receiver, const octet* bytes, std::uint32_t size, const Locator_t& local,
-           const Locator_t& remote, double delay_s) {
+  void Add(rtps::TransportReceiverInterface* receiver, const octet* bytes, std::uint32_t size,
+           const Locator_t& local, const Locator_t& remote, double delay_s) {
     const std::lock_guard lock(mutex_);
     if (late_.size() >= kMostLateDatagrams) {
       return;
     }
-    const auto due = std::chrono::steady_clock::now() +
-                     std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::duration<double>(delay_s));
+    const auto due = std::chrono::steady_clock::now() + std::chrono::duration_cast<std::chrono::nanoseconds>(
+                                                            std::chrono::duration<double>(delay_s));
     late_.push_back({due, receiver, std::vector<octet>(bytes, bytes + size), local, remote});
     if (!thread_.joinable()) {
       thread_ = std::thread([this] { Deliver(); });
@@ -115,8 +115,8 @@ class LateDelivery {
         late_.pop_front();
         delivering_ = true;
         lock.unlock();
-        entry.receiver->OnDataReceived(entry.bytes.data(), static_cast<std::uint32_t>(entry.bytes.size()), entry.local,
-                                       entry.remote);
+        entry.receiver->OnDataReceived(entry.bytes.data(), static_cast<std::uint32_t>(entry.bytes.size()),
+                                       entry.local, entry.remote);
         lock.lock();
         delivering_ = false;
         changed_.notify_all();
@@ -134,7 +134,8 @@ class LateDelivery {
 
 class GuardDescriptor : public rtps::ChainingTransportDescriptor {
  public:
-  GuardDescriptor(std::shared_ptr<rtps::TransportDescriptorInterface> low_level, std::shared_ptr<GuardState> shared)
+  GuardDescriptor(std::shared_ptr<rtps::TransportDescriptorInterface> low_level,
+                  std::shared_ptr<GuardState> shared)
       : rtps::ChainingTransportDescriptor(std::move(low_level)), state(std::move(shared)) {
     maxMessageSize -= 64;  // the trailer, and on to a multiple of four for the fragmenter
   }
@@ -152,8 +153,8 @@ class GuardTransport : public rtps::ChainingTransport {
 
   rtps::TransportDescriptorInterface* get_configuration() override { return &descriptor_; }
 
-  bool send(SenderResource* low, const octet* bytes, std::uint32_t size, LocatorsIterator* begin, LocatorsIterator* end,
-            const std::chrono::steady_clock::time_point& timeout) override {
+  bool send(SenderResource* low, const octet* bytes, std::uint32_t size, LocatorsIterator* begin,
+            LocatorsIterator* end, const std::chrono::steady_clock::time_point& timeout) override {
     DatagramGuard* guard = state_->guard();
     if (guard == nullptr) {
       return low->send(bytes, size, begin, end, timeout);
@@ -163,8 +164,8 @@ class GuardTransport : public rtps::ChainingTransport {
     return low->send(sealed_.data(), static_cast<std::uint32_t>(sealed_.size()), begin, end, timeout);
   }
 
-  void receive(rtps::TransportReceiverInterface* next, const octet* bytes, std::uint32_t size, const Locator_t& local,
-               const Locator_t& remote) override {
+  void receive(rtps::TransportReceiverInterface* next, const octet* bytes, std::uint32_t size,
+               const Locator_t& local, const Locator_t& remote) override {
     if (DatagramGuard* guard = state_->guard()) {
       const auto payload = guard->Open({bytes, size});
       if (!payload) {

@@ -49,7 +49,8 @@ absl::StatusOr<std::vector<std::string>> InterfaceAddresses(const std::vector<st
   freeifaddrs(list);
   if (!missing.empty()) {
     return Trouble(absl::StatusCode::kInvalidArgument, "BAD_INTERFACE",
-                   "bus.interfaces: this host has no interface " + missing + "; it has" + known, {{"interface", missing}});
+                   "bus.interfaces: this host has no interface " + missing + "; it has" + known,
+                   {{"interface", missing}});
   }
   return addresses;
 }
@@ -64,7 +65,8 @@ absl::StatusOr<std::vector<std::string>> PeerAddresses(const std::vector<std::st
     const int error = getaddrinfo(peer.c_str(), nullptr, &hints, &found);
     if (error != 0) {
       return Trouble(absl::StatusCode::kInvalidArgument, "BAD_PEER",
-                     "bus.initial_peers: no address for " + peer + ": " + gai_strerror(error), {{"peer", peer}});
+                     "bus.initial_peers: no address for " + peer + ": " + gai_strerror(error),
+                     {{"peer", peer}});
     }
     addresses.push_back(AddressText(found->ai_addr));
     freeaddrinfo(found);

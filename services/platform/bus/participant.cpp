@@ -1,12 +1,13 @@
 #include "platform/bus/participant.hpp"
 
+#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
+#include <fastrtps/utils/IPLocator.h>
+#include <unistd.h>
+
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
 #include <fastdds/dds/log/Log.hpp>
 #include <fastdds/dds/publisher/qos/PublisherQos.hpp>
 #include <fastdds/dds/subscriber/qos/SubscriberQos.hpp>
-#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
-#include <fastrtps/utils/IPLocator.h>
-#include <unistd.h>
 
 #include "foundation/contract/trouble.hpp"
 #include "platform/bus/guard_key.hpp"
@@ -50,10 +51,11 @@ absl::StatusOr<std::unique_ptr<DatagramGuard>> MakeGuard(const BusOptions& optio
                    "bus.allow_unguarded: true where anyone on the network may stop the machine");
   }
   if (log != nullptr) {
-    log->Warning("bus_unguarded",
-                 "THE BUS IS NOT GUARDED: any process that can send a datagram here can stop or steer this machine; "
-                 "name a key file in bus.key_file",
-                 {{"loopback_only", loopback}});
+    log->Warning(
+        "bus_unguarded",
+        "THE BUS IS NOT GUARDED: any process that can send a datagram here can stop or steer this machine; "
+        "name a key file in bus.key_file",
+        {{"loopback_only", loopback}});
   }
   return std::unique_ptr<DatagramGuard>();
 }
@@ -78,20 +80,22 @@ absl::Status Participant::Inside::LoadProfiles() {
   }
   if (access(options.profile_file.c_str(), R_OK) != 0) {
     return Trouble(absl::StatusCode::kNotFound, "NO_PROFILE_FILE",
-                   "bus.profile_file: cannot read " + options.profile_file + "; deploy/dds/profiles.xml is the one to name",
+                   "bus.profile_file: cannot read " + options.profile_file +
+                       "; deploy/dds/profiles.xml is the one to name",
                    {{"path", options.profile_file}});
   }
   if (factory->load_XML_profiles_file(options.profile_file) != ReturnCode_t::RETCODE_OK ||
       factory->get_participant_qos_from_profile(kParticipantProfile, qos) != ReturnCode_t::RETCODE_OK) {
     return Trouble(absl::StatusCode::kInvalidArgument, "BAD_PROFILE_FILE",
-                   "bus.profile_file: " + options.profile_file + " is not a profile file with a participant profile '" +
-                       kParticipantProfile + "'",
+                   "bus.profile_file: " + options.profile_file +
+                       " is not a profile file with a participant profile '" + kParticipantProfile + "'",
                    {{"path", options.profile_file}});
   }
   return absl::OkStatus();
 }
 
-absl::Status Participant::Inside::AddTransport(dds::DomainParticipantQos& qos, const std::vector<std::string>& own) {
+absl::Status Participant::Inside::AddTransport(dds::DomainParticipantQos& qos,
+                                               const std::vector<std::string>& own) {
   auto udp = std::make_shared<rtps::UDPv4TransportDescriptor>();
   udp->sendBufferSize = kSocketBufferBytes;
   udp->receiveBufferSize = kSocketBufferBytes;
@@ -181,7 +185,8 @@ dds::Topic* Participant::Inside::AcquireTopic(const std::string& name, dds::Type
   auto* description = participant->lookup_topicdescription(name);
   dds::Topic* topic = nullptr;
   if (description != nullptr) {
-    topic = description->get_type_name() == type.get_type_name() ? static_cast<dds::Topic*>(description) : nullptr;
+    topic = description->get_type_name() == type.get_type_name() ? static_cast<dds::Topic*>(description)
+                                                                 : nullptr;
   } else if (type.register_type(participant) == ReturnCode_t::RETCODE_OK) {
     topic = participant->create_topic(name, type.get_type_name(), dds::TOPIC_QOS_DEFAULT);
   }
@@ -198,8 +203,8 @@ void Participant::Inside::ReleaseTopic(dds::Topic* topic) {
   }
 }
 
-void Participant::Inside::on_participant_discovery(dds::DomainParticipant*,
-                                                   eprosima::fastrtps::rtps::ParticipantDiscoveryInfo&& info) {
+void Participant::Inside::on_participant_discovery(
+    dds::DomainParticipant*, eprosima::fastrtps::rtps::ParticipantDiscoveryInfo&& info) {
   using eprosima::fastrtps::rtps::ParticipantDiscoveryInfo;
   const std::string name = info.info.m_participantName.to_string();
   if (info.status == ParticipantDiscoveryInfo::DISCOVERED_PARTICIPANT) {
@@ -224,16 +229,17 @@ void Participant::Inside::on_participant_discovery(dds::DomainParticipant*,
 Participant::Participant() : inside_(std::make_unique<Inside>()) {}
 Participant::~Participant() = default;
 
-absl::StatusOr<std::unique_ptr<Participant>> Participant::Open(const BusOptions& options, Log* log, Metrics* metrics) {
+absl::StatusOr<std::unique_ptr<Participant>> Participant::Open(const BusOptions& options, Log* log,
+                                                               Metrics* metrics) {
   std::unique_ptr<Participant> self(new Participant);
   self->inside_->log = log;
   self->inside_->metrics = metrics;
   if (metrics != nullptr) {
     self->inside_->peers_gauge = metrics->AddGauge("lambdajet_bus_peers", "Processes seen on the bus now.");
     for (std::size_t i = 0; i < self->inside_->guard_counters.size(); ++i) {
-      self->inside_->guard_counters[i] =
-          metrics->AddCounter("lambdajet_bus_guard_datagrams_total", "Datagrams that arrived, by the guard's verdict.",
-                              {{"verdict", GuardVerdictName(static_cast<GuardVerdict>(i))}});
+      self->inside_->guard_counters[i] = metrics->AddCounter(
+          "lambdajet_bus_guard_datagrams_total", "Datagrams that arrived, by the guard's verdict.",
+          {{"verdict", GuardVerdictName(static_cast<GuardVerdict>(i))}});
     }
   }
   if (absl::Status status = self->inside_->Start(options); !status.ok()) {

@@ -22,7 +22,8 @@ class Metrics;
 class Participant {
  public:
   // `log` and `metrics` may be null; otherwise they outlive the participant.
-  static absl::StatusOr<std::unique_ptr<Participant>> Open(const BusOptions& options, Log* log, Metrics* metrics);
+  static absl::StatusOr<std::unique_ptr<Participant>> Open(const BusOptions& options, Log* log,
+                                                           Metrics* metrics);
   ~Participant();
   Participant(const Participant&) = delete;
   Participant& operator=(const Participant&) = delete;

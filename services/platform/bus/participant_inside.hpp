@@ -1,14 +1,14 @@
 // What a participant shares with its endpoints. Private to platform/bus: no house includes it.
 #pragma once
 
+#include <array>
+#include <atomic>
 #include <fastdds/dds/domain/DomainParticipant.hpp>
 #include <fastdds/dds/domain/DomainParticipantListener.hpp>
 #include <fastdds/dds/publisher/Publisher.hpp>
 #include <fastdds/dds/subscriber/Subscriber.hpp>
 #include <fastdds/dds/topic/Topic.hpp>
 #include <fastdds/dds/topic/TypeSupport.hpp>
-#include <array>
-#include <atomic>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -28,7 +28,8 @@ class Participant::Inside : public eprosima::fastdds::dds::DomainParticipantList
   absl::Status Start(const BusOptions& options);
 
   // Topics are shared by the endpoints of one name and counted; null if the name stands for another type.
-  eprosima::fastdds::dds::Topic* AcquireTopic(const std::string& name, eprosima::fastdds::dds::TypeSupport type);
+  eprosima::fastdds::dds::Topic* AcquireTopic(const std::string& name,
+                                              eprosima::fastdds::dds::TypeSupport type);
   void ReleaseTopic(eprosima::fastdds::dds::Topic* topic);
 
   void on_participant_discovery(eprosima::fastdds::dds::DomainParticipant* participant,
@@ -48,7 +49,8 @@ class Participant::Inside : public eprosima::fastdds::dds::DomainParticipantList
 
  private:
   absl::Status LoadProfiles();
-  absl::Status AddTransport(eprosima::fastdds::dds::DomainParticipantQos& qos, const std::vector<std::string>& own);
+  absl::Status AddTransport(eprosima::fastdds::dds::DomainParticipantQos& qos,
+                            const std::vector<std::string>& own);
   absl::Status AddPeers(eprosima::fastdds::dds::DomainParticipantQos& qos, bool loopback);
 
   std::mutex topics_mutex_;

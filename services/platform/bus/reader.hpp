@@ -39,8 +39,10 @@ class Reader {
     return Reader(std::move(*core));
   }
 
-  int matched() const { return core_->matched(); }  // writers now, those that have died but not yet expired included
-  int alive() const { return core_->alive(); }      // writers whose liveliness lease holds
+  int matched() const {
+    return core_->matched();
+  }  // writers now, those that have died but not yet expired included
+  int alive() const { return core_->alive(); }  // writers whose liveliness lease holds
 
  private:
   explicit Reader(std::unique_ptr<ReaderCore> core) : core_(std::move(core)) {}

@@ -22,7 +22,8 @@ class Writer {
  public:
   using Sample = typename PubSubType::type;
 
-  static absl::StatusOr<Writer> Open(Participant& participant, const TopicSpec& topic, EndpointEvents events = {}) {
+  static absl::StatusOr<Writer> Open(Participant& participant, const TopicSpec& topic,
+                                     EndpointEvents events = {}) {
     auto core = WriterCore::Open(participant, topic, new PubSubType(), std::move(events));
     if (!core.ok()) {
       return core.status();

@@ -81,19 +81,23 @@ void ArgumentChecks::Positive(std::string_view field, double value, std::string_
   }
 }
 
-void ArgumentChecks::InRange(std::string_view field, double value, double least, double most, std::string_view unit) {
+void ArgumentChecks::InRange(std::string_view field, double value, double least, double most,
+                             std::string_view unit) {
   if (!std::isfinite(value)) {
     Finite(field, value, unit);
   } else if (value < least || value > most) {
     Add(field, "OUT_OF_RANGE",
-        "is " + NumberText(value, unit) + "; right is " + NumberText(least, "") + " to " + NumberText(most, unit));
+        "is " + NumberText(value, unit) + "; right is " + NumberText(least, "") + " to " +
+            NumberText(most, unit));
   }
 }
 
-void ArgumentChecks::CountInRange(std::string_view field, std::size_t count, std::size_t least, std::size_t most) {
+void ArgumentChecks::CountInRange(std::string_view field, std::size_t count, std::size_t least,
+                                  std::size_t most) {
   if (count < least || count > most) {
     Add(field, count < least ? "TOO_FEW" : "TOO_MANY",
-        "has " + std::to_string(count) + " entries; right is " + std::to_string(least) + " to " + std::to_string(most));
+        "has " + std::to_string(count) + " entries; right is " + std::to_string(least) + " to " +
+            std::to_string(most));
   }
 }
 

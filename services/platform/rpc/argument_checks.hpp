@@ -26,12 +26,12 @@ class ArgumentChecks {
   static constexpr std::size_t kMostViolations = 20;
 
   void Finite(std::string_view field, double value, std::string_view unit = "");
-  void Positive(std::string_view field, double value, std::string_view unit = "");      // finite and above 0
+  void Positive(std::string_view field, double value, std::string_view unit = "");  // finite and above 0
   void InRange(std::string_view field, double value, double least, double most, std::string_view unit = "");
   void CountInRange(std::string_view field, std::size_t count, std::size_t least, std::size_t most);
   void NonEmpty(std::string_view field, std::string_view text);
-  void Id(std::string_view field, std::string_view text);                               // [a-z0-9-]{1,63}
-  void Text(std::string_view field, std::string_view text, std::size_t most_bytes);     // UTF-8, no NUL
+  void Id(std::string_view field, std::string_view text);                            // [a-z0-9-]{1,63}
+  void Text(std::string_view field, std::string_view text, std::size_t most_bytes);  // UTF-8, no NUL
   void Require(bool holds, std::string_view field, std::string_view reason, std::string_view description);
 
   // Every element of a packed batch: any container of double with begin() and end().

@@ -31,9 +31,9 @@ class MethodWatch {
   MethodWatch(std::string method, Log* log, Metrics* metrics)
       : method_(std::move(method)), log_(log), metrics_(metrics) {
     if (metrics_ != nullptr) {
-      seconds_ = metrics_->AddHistogram("lambdajet_rpc_duration_seconds", "From the call's arrival to its status.",
-                                        {0.0001, 0.0003, 0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1, 3, 10, 30},
-                                        {{"method", method_}});
+      seconds_ = metrics_->AddHistogram(
+          "lambdajet_rpc_duration_seconds", "From the call's arrival to its status.",
+          {0.0001, 0.0003, 0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1, 3, 10, 30}, {{"method", method_}});
       running_ = metrics_->AddGauge("lambdajet_rpc_running", "Calls that run now.", {{"method", method_}});
       ok_ = CounterOf(grpc::StatusCode::OK);
     }
@@ -101,7 +101,9 @@ class CallWatchFactory final : public grpc::experimental::ServerInterceptorFacto
  public:
   CallWatchFactory(Log* log, Metrics* metrics) : log_(log), metrics_(metrics) {}
 
-  Interceptor* CreateServerInterceptor(ServerRpcInfo* call) override { return new CallWatch(Method(call->method())); }
+  Interceptor* CreateServerInterceptor(ServerRpcInfo* call) override {
+    return new CallWatch(Method(call->method()));
+  }
 
  private:
   // gRPC keeps a registered method's name for the server's life, so its address names the method.
@@ -128,7 +130,8 @@ class CallWatchFactory final : public grpc::experimental::ServerInterceptorFacto
 
 }  // namespace
 
-std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface> MakeCallWatch(Log* log, Metrics* metrics) {
+std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface> MakeCallWatch(Log* log,
+                                                                                     Metrics* metrics) {
   return std::make_unique<CallWatchFactory>(log, metrics);
 }
 

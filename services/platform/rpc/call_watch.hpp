@@ -17,6 +17,7 @@ class Log;
 class Metrics;
 
 // Either may be null.
-std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface> MakeCallWatch(Log* log, Metrics* metrics);
+std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface> MakeCallWatch(Log* log,
+                                                                                     Metrics* metrics);
 
 }  // namespace lambdajet

@@ -33,11 +33,12 @@ absl::StatusOr<std::shared_ptr<grpc::ServerCredentials>> MakeCredentials(const R
   namespace tls = grpc::experimental;
   if (options.certificate_file.empty() && options.key_file.empty() && options.client_ca_file.empty()) {
     if (!IsLoopbackAddress(options.address) && !options.allow_plaintext) {
-      return Trouble(absl::StatusCode::kFailedPrecondition, "PLAINTEXT_REFUSED",
-                     "rpc.address " + options.address +
-                         " is not loopback and rpc.certificate_file is empty: name a certificate and a key, or say "
-                         "rpc.allow_plaintext: true",
-                     {{"address", options.address}});
+      return Trouble(
+          absl::StatusCode::kFailedPrecondition, "PLAINTEXT_REFUSED",
+          "rpc.address " + options.address +
+              " is not loopback and rpc.certificate_file is empty: name a certificate and a key, or say "
+              "rpc.allow_plaintext: true",
+          {{"address", options.address}});
     }
     return grpc::InsecureServerCredentials();
   }
@@ -113,11 +114,12 @@ absl::Status RpcServer::Start() {
   inside_->server = builder.BuildAndStart();
   if (inside_->server == nullptr || port_ == 0) {
     inside_->server.reset();
-    return Trouble(absl::StatusCode::kUnavailable, "ADDRESS_IN_USE",
-                   "cannot serve gRPC on " + options_.address +
-                       ": another process listens there, or the address is not this host's; rpc.address may end in "
-                       "port 0 for a free port",
-                   {{"address", options_.address}});
+    return Trouble(
+        absl::StatusCode::kUnavailable, "ADDRESS_IN_USE",
+        "cannot serve gRPC on " + options_.address +
+            ": another process listens there, or the address is not this host's; rpc.address may end in "
+            "port 0 for a free port",
+        {{"address", options_.address}});
   }
   SetServing(false);
   return absl::OkStatus();

@@ -25,17 +25,17 @@ class Log;
 class Metrics;
 
 struct RpcOptions {
-  std::string address = "127.0.0.1:0";   // port 0 takes a free one
-  std::string certificate_file;          // PEM chain; empty: plaintext
-  std::string key_file;                  // PEM
-  std::string client_ca_file;            // PEM; empty: clients need no certificate
-  bool allow_plaintext = false;          // beyond loopback
+  std::string address = "127.0.0.1:0";  // port 0 takes a free one
+  std::string certificate_file;         // PEM chain; empty: plaintext
+  std::string key_file;                 // PEM
+  std::string client_ca_file;           // PEM; empty: clients need no certificate
+  bool allow_plaintext = false;         // beyond loopback
   bool reflection = false;
   int most_message_mib = 16;
   int most_metadata_kib = 8;
   int most_memory_mib = 256;
-  int most_streams = 200;                // at once, on one connection
-  double shutdown_deadline_s = 5.0;      // then running calls are cancelled
+  int most_streams = 200;            // at once, on one connection
+  double shutdown_deadline_s = 5.0;  // then running calls are cancelled
 };
 
 class RpcServer {

@@ -38,7 +38,9 @@ template <typename Message>
 grpc::ServerWriteReactor<Message>* NewPullStream(std::function<absl::StatusOr<bool>(Message&)> next) {
   class Pull final : public grpc::ServerWriteReactor<Message> {
    public:
-    explicit Pull(std::function<absl::StatusOr<bool>(Message&)> source) : next_(std::move(source)) { Continue(); }
+    explicit Pull(std::function<absl::StatusOr<bool>(Message&)> source) : next_(std::move(source)) {
+      Continue();
+    }
     void OnWriteDone(bool ok) override {
       if (ok) {
         Continue();

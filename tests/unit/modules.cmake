@@ -1,0 +1,1 @@
+lambdajet_check(modules_virtual_cell_test LABELS unit SOURCES modules_virtual_cell_test.cpp DEPS virtual_cell platform_machine_file)
