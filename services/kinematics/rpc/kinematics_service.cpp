@@ -1,0 +1,77 @@
+#include "kinematics/rpc/kinematics_service.hpp"
+
+#include "kinematics/rpc/batch_stream.hpp"
+#include "kinematics/rpc/wire_workspace.hpp"
+#include "platform/rpc/handlers.hpp"
+
+namespace lambdajet::kinematics {
+
+using Rpc = KinematicsRpc;
+
+Rpc::Unary* Rpc::GetMachine(Context* context, const v1::GetMachineRequest* request,
+                            v1::GetMachineResponse* response) {
+  return Answer(context, [&] { return answers_.GetMachine(*request, *response); });
+}
+
+Rpc::Unary* Rpc::SolveInverse(Context* context, const v1::SolveInverseRequest* request,
+                              v1::SolveInverseResponse* response) {
+  return Answer(context, [&] { return answers_.SolveInverse(*request, *response); });
+}
+
+Rpc::Unary* Rpc::SolveForward(Context* context, const v1::SolveForwardRequest* request,
+                              v1::SolveForwardResponse* response) {
+  return Answer(context, [&] { return answers_.SolveForward(*request, *response); });
+}
+
+Rpc::Unary* Rpc::SolveInverseBatch(Context* context, const v1::SolveInverseBatchRequest* request,
+                                   v1::SolveInverseBatchResponse* response) {
+  return Answer(context, [&] { return answers_.SolveBatch(*request, *response); });
+}
+
+Rpc::Unary* Rpc::SolveForwardBatch(Context* context, const v1::SolveForwardBatchRequest* request,
+                                   v1::SolveForwardBatchResponse* response) {
+  return Answer(context, [&] { return answers_.SolveBatch(*request, *response); });
+}
+
+grpc::ServerBidiReactor<v1::SolveInverseBatchRequest, v1::SolveInverseBatchResponse>* Rpc::StreamInverse(
+    Context*) {
+  return new BatchStream<v1::SolveInverseBatchRequest, v1::SolveInverseBatchResponse>(answers_);
+}
+
+grpc::ServerBidiReactor<v1::SolveForwardBatchRequest, v1::SolveForwardBatchResponse>* Rpc::StreamForward(
+    Context*) {
+  return new BatchStream<v1::SolveForwardBatchRequest, v1::SolveForwardBatchResponse>(answers_);
+}
+
+Rpc::Unary* Rpc::ComputeJacobian(Context* context, const v1::ComputeJacobianRequest* request,
+                                 v1::ComputeJacobianResponse* response) {
+  return Answer(context, [&] { return answers_.ComputeJacobian(*request, *response); });
+}
+
+Rpc::Unary* Rpc::ReportSingularity(Context* context, const v1::ReportSingularityRequest* request,
+                                   v1::ReportSingularityResponse* response) {
+  return Answer(context, [&] { return answers_.ReportSingularity(*request, *response); });
+}
+
+Rpc::Unary* Rpc::ComputeServiceArea(Context* context, const v1::ComputeServiceAreaRequest* request,
+                                    v1::ComputeServiceAreaResponse* response) {
+  return AnswerOn(long_work_, context, [this, request, response](const Cancelled&) {
+    return answers_.ComputeServiceArea(*request, *response);
+  });
+}
+
+Rpc::Unary* Rpc::ComputeWorkspace(Context* context, const v1::ComputeWorkspaceRequest* request,
+                                  v1::ComputeWorkspaceResponse* response) {
+  return AnswerOn(long_work_, context, [this, request, response](const Cancelled& cancelled) {
+    return kinematics::ComputeWorkspace(slot_, *request, cancelled, *response);
+  });
+}
+
+Rpc::Unary* Rpc::OptimiseGeometry(Context* context, const v1::OptimiseGeometryRequest* request,
+                                  v1::OptimiseGeometryResponse* response) {
+  return AnswerOn(long_work_, context, [this, request, response](const Cancelled& cancelled) {
+    return kinematics::OptimiseGeometry(slot_, *request, cancelled, *response);
+  });
+}
+
+}  // namespace lambdajet::kinematics

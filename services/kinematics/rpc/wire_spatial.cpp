@@ -1,0 +1,302 @@
+#include "kinematics/rpc/wire_spatial.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/LU>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "kinematics/core/hexapod_jacobian.hpp"
+#include "kinematics/core/hexapod_singularity.hpp"
+#include "kinematics/rpc/wire_planar.hpp"
+
+namespace lambdajet::kinematics {
+namespace {
+
+constexpr double kLargestMm = 1e6;
+constexpr double kLargestRad = 1e3;
+constexpr double kUnlimitedRad = 3.15;
+
+Eigen::Vector3d VectorFromWire(const v1::SpatialVector& wire, const std::string& field,
+                               ArgumentChecks& checks) {
+  checks.InRange(field + ".x_mm", wire.x_mm(), -kLargestMm, kLargestMm, "mm");
+  checks.InRange(field + ".y_mm", wire.y_mm(), -kLargestMm, kLargestMm, "mm");
+  checks.InRange(field + ".z_mm", wire.z_mm(), -kLargestMm, kLargestMm, "mm");
+  return {wire.x_mm(), wire.y_mm(), wire.z_mm()};
+}
+
+double AngleFromWire(double angle_rad, const std::string& field, ArgumentChecks& checks) {
+  checks.InRange(field, angle_rad, -kLargestRad, kLargestRad, "rad");
+  return angle_rad;
+}
+
+Eigen::Matrix3d QuaternionFromWire(const v1::Quaternion& q, const std::string& field,
+                                   ArgumentChecks& checks) {
+  const double norm = std::hypot(std::hypot(q.w(), q.x()), std::hypot(q.y(), q.z()));
+  checks.InRange(field + ".quaternion", norm, 0.5, 2.0, "norm");
+  return norm > 0.0 && std::isfinite(norm)
+             ? Eigen::Quaterniond(q.w(), q.x(), q.y(), q.z()).normalized().toRotationMatrix()
+             : Eigen::Matrix3d::Identity();
+}
+
+Eigen::Matrix3d MatrixFromWire(const v1::RotationMatrix& wire, const std::string& field,
+                               ArgumentChecks& checks) {
+  checks.CountInRange(field + ".matrix.element", static_cast<std::size_t>(wire.element_size()), 9, 9);
+  if (wire.element_size() != 9) {
+    return Eigen::Matrix3d::Identity();
+  }
+  const Eigen::Matrix3d R =
+      Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(wire.element().data());
+  const double fault = (R * R.transpose() - Eigen::Matrix3d::Identity()).norm();
+  checks.Require(fault <= 1e-6 && R.determinant() > 0.0, field + ".matrix.element", "NOT_A_ROTATION",
+                 fmt::format("differs from a rotation by {:.3g}; at most 1e-6 is right", fault));
+  return R;
+}
+
+Eigen::Matrix3d RotationFromWire(const v1::SpatialPose& wire, const std::string& field,
+                                 ArgumentChecks& checks) {
+  switch (wire.rotation_case()) {
+    case v1::SpatialPose::kKrylov:
+      return KrylovAngles{AngleFromWire(wire.krylov().psi_rad(), field + ".krylov.psi_rad", checks),
+                          AngleFromWire(wire.krylov().theta_rad(), field + ".krylov.theta_rad", checks),
+                          AngleFromWire(wire.krylov().gamma_rad(), field + ".krylov.gamma_rad", checks)}
+          .Rotation();
+    case v1::SpatialPose::kRollPitchYaw:
+      return RollPitchYaw{
+          AngleFromWire(wire.roll_pitch_yaw().roll_rad(), field + ".roll_pitch_yaw.roll_rad", checks),
+          AngleFromWire(wire.roll_pitch_yaw().pitch_rad(), field + ".roll_pitch_yaw.pitch_rad", checks),
+          AngleFromWire(wire.roll_pitch_yaw().yaw_rad(), field + ".roll_pitch_yaw.yaw_rad", checks)}
+          .Rotation();
+    case v1::SpatialPose::kQuaternion:
+      return QuaternionFromWire(wire.quaternion(), field, checks);
+    case v1::SpatialPose::kMatrix:
+      return MatrixFromWire(wire.matrix(), field, checks);
+    case v1::SpatialPose::ROTATION_NOT_SET:
+      break;
+  }
+  return Eigen::Matrix3d::Identity();
+}
+
+UniversalJoint JointFromWire(const v1::UniversalJoint& w) {
+  UniversalJoint j;
+  j.a1x_mm = w.a1x_mm();
+  j.a1y_mm = w.a1y_mm();
+  j.a1z_mm = w.a1z_mm();
+  j.dx_rad = w.dx_rad();
+  j.dz_rad = w.dz_rad();
+  j.ex_mm = w.ex_mm();
+  j.ez_mm = w.ez_mm();
+  j.eps_rad = w.eps_rad();
+  j.h_mm = w.h_mm();
+  j.nu_rad = w.nu_rad();
+  return j;
+}
+
+void CheckJoint(const v1::UniversalJoint& w, const std::string& field, ArgumentChecks& checks) {
+  for (const double length : {w.a1x_mm(), w.a1y_mm(), w.a1z_mm(), w.ex_mm(), w.ez_mm(), w.h_mm()}) {
+    checks.InRange(field, length, -100.0, 100.0, "mm");
+  }
+  for (const double angle : {w.dx_rad(), w.dz_rad(), w.eps_rad(), w.nu_rad()}) {
+    checks.InRange(field, angle, -0.5, 0.5, "rad");
+  }
+}
+
+void StrutFromWire(const v1::HexapodGeometry& wire, int j, HexapodGeometry& geometry,
+                   ArgumentChecks& checks) {
+  const std::string field = fmt::format("mechanism.hexapod.strut[{}]", j);
+  const v1::StrutGeometry& strut = wire.strut(j);
+  geometry.p_MA_mm.col(j) = VectorFromWire(strut.p_ma(), field + ".p_MA", checks);
+  geometry.p_PB_mm.col(j) = VectorFromWire(strut.p_pb(), field + ".p_PB", checks);
+  checks.InRange(field + ".length_zero_mm", strut.length_zero_mm(), -kLargestMm, kLargestMm, "mm");
+  geometry.length_zero_mm[j] = strut.length_zero_mm();
+  if (strut.has_joint()) {
+    CheckJoint(strut.joint(), field + ".joint", checks);
+    geometry.joints[static_cast<std::size_t>(j)] = JointFromWire(strut.joint());
+  }
+}
+
+void LimitsFromWire(const v1::HexapodGeometry& wire, HexapodLimits& limits, ArgumentChecks& checks) {
+  checks.InRange("mechanism.hexapod.strut_min_mm", wire.strut_min_mm(), 0.0, kLargestMm, "mm");
+  checks.InRange("mechanism.hexapod.strut_max_mm", wire.strut_max_mm(), 0.0, kLargestMm, "mm");
+  checks.InRange("mechanism.hexapod.base_cone_rad", wire.base_cone_rad(), 0.0, kUnlimitedRad, "rad");
+  checks.InRange("mechanism.hexapod.platform_cone_rad", wire.platform_cone_rad(), 0.0, kUnlimitedRad, "rad");
+  checks.InRange("mechanism.hexapod.singular_margin", wire.singular_margin(), 0.0, 1.0, "mm/mm");
+  limits.strut_min_mm = wire.strut_min_mm();
+  limits.strut_max_mm =
+      wire.strut_max_mm() == 0.0 ? std::numeric_limits<double>::infinity() : wire.strut_max_mm();
+  limits.base_cone_rad = wire.base_cone_rad() == 0.0 ? kUnlimitedRad : wire.base_cone_rad();
+  limits.platform_cone_rad = wire.platform_cone_rad() == 0.0 ? kUnlimitedRad : wire.platform_cone_rad();
+  limits.singular_margin = wire.singular_margin();
+}
+
+void RefusalToWire(Reason reason, double excess, int strut, v1::Refusal& wire) {
+  wire.set_reason(ToWire(reason));
+  wire.set_message(strut < 0 ? RefusalMessage(reason, excess)
+                             : fmt::format("strut {}: {}", strut + 1, RefusalMessage(reason, excess)));
+  wire.set_excess(excess);
+  wire.set_strut(static_cast<std::uint32_t>(strut + 1));
+}
+
+// The numbers of a service area that a request may set, by name.
+struct ServiceNumber {
+  const char* name;
+  double ServiceAreaMachine::*member;
+};
+constexpr std::array<ServiceNumber, 9> kServiceNumbers = {{
+    {"base_joint_spacing_mm", &ServiceAreaMachine::base_joint_spacing_mm},
+    {"platform_joint_spacing_mm", &ServiceAreaMachine::platform_joint_spacing_mm},
+    {"strut_min_mm", &ServiceAreaMachine::strut_min_mm},
+    {"strut_max_mm", &ServiceAreaMachine::strut_max_mm},
+    {"tool_length_mm", &ServiceAreaMachine::tool_length_mm},
+    {"tilt_rad", &ServiceAreaMachine::tilt_rad},
+    {"height_mm", &ServiceAreaMachine::height_mm},
+    {"frame_top_ratio", &ServiceAreaMachine::frame_top_ratio},
+    {"frame_bottom_ratio", &ServiceAreaMachine::frame_bottom_ratio},
+}};
+
+void SetServiceNumber(const std::string& name, double value, const std::string& field,
+                      ServiceAreaMachine& machine, ArgumentChecks& checks) {
+  for (const ServiceNumber& number : kServiceNumbers) {
+    if (name == number.name) {
+      checks.InRange(field, value, -kLargestMm, kLargestMm);
+      machine.*number.member = value;
+      return;
+    }
+  }
+  checks.Require(false, field, "UNKNOWN_PARAMETER",
+                 "no number of the service area has this name; see service_area.hpp");
+}
+
+}  // namespace
+
+std::optional<Hexapod> FromWire(const v1::HexapodGeometry& wire, ArgumentChecks& checks) {
+  checks.CountInRange("mechanism.hexapod.strut", static_cast<std::size_t>(wire.strut_size()), kStruts,
+                      kStruts);
+  checks.Require(wire.has_x_mp_home(), "mechanism.hexapod.X_MP_home", "EMPTY", "the home pose is missing");
+  if (!checks.ok()) {
+    return std::nullopt;
+  }
+  HexapodGeometry geometry;
+  for (int j = 0; j < kStruts; ++j) {
+    StrutFromWire(wire, j, geometry, checks);
+  }
+  LimitsFromWire(wire, geometry.limits, checks);
+  geometry.X_MP_home = FromWire(wire.x_mp_home(), "mechanism.hexapod.X_MP_home", checks);
+  if (wire.has_x_pt()) {
+    geometry.X_PT = FromWire(wire.x_pt(), "mechanism.hexapod.X_PT", checks);
+  }
+  checks.InRange("mechanism.hexapod.screw_lead_mm", wire.screw_lead_mm(), -1000.0, 1000.0, "mm a turn");
+  geometry.screw_lead_mm = wire.screw_lead_mm();
+  if (!checks.ok()) {
+    return std::nullopt;
+  }
+  LayJointFrames(geometry);
+  const std::string_view fault = FaultOf(geometry);
+  checks.Require(fault.empty(), "mechanism.hexapod", "BAD_GEOMETRY", std::string(fault));
+  return fault.empty() ? std::optional<Hexapod>(geometry) : std::nullopt;
+}
+
+Pose FromWire(const v1::SpatialPose& wire, const std::string& field, ArgumentChecks& checks) {
+  return {VectorFromWire(wire.position(), field + ".position", checks),
+          RotationFromWire(wire, field, checks)};
+}
+
+void ToWire(const Pose& pose, v1::SpatialPose& wire) {
+  wire.mutable_position()->set_x_mm(pose.p_mm.x());
+  wire.mutable_position()->set_y_mm(pose.p_mm.y());
+  wire.mutable_position()->set_z_mm(pose.p_mm.z());
+  const KrylovAngles angles = pose.krylov();
+  wire.mutable_krylov()->set_psi_rad(angles.psi_rad);
+  wire.mutable_krylov()->set_theta_rad(angles.theta_rad);
+  wire.mutable_krylov()->set_gamma_rad(angles.gamma_rad);
+}
+
+void SolveToWire(const Hexapod& hexapod, const Pose& X_MT, v1::SolveInverseResponse& wire) {
+  const HexapodInverse answer = SolveInverseWithMargin(hexapod, PlatformFromTool(hexapod, X_MT));
+  if (answer.reason != Reason::kSolved) {
+    return RefusalToWire(answer.reason, answer.excess, answer.strut, *wire.mutable_refusal());
+  }
+  wire.mutable_solution()->mutable_actuator_position_mm()->Add(answer.actuators_mm.data(),
+                                                               answer.actuators_mm.data() + kStruts);
+}
+
+void SolveToWire(const Hexapod& hexapod, const StrutVector& actuators_mm, const Pose& X_MT_start,
+                 v1::SolveForwardResponse& wire) {
+  const HexapodForward answer = SolveForward(hexapod, actuators_mm, PlatformFromTool(hexapod, X_MT_start));
+  if (answer.reason != Reason::kSolved) {
+    return RefusalToWire(answer.reason, 0.0, answer.strut, *wire.mutable_refusal());
+  }
+  v1::ForwardSolution& solution = *wire.mutable_solution();
+  ToWire(ToolFromPlatform(hexapod, answer.X_MP), *solution.mutable_x_mt());
+  solution.set_iterations(static_cast<std::uint32_t>(answer.iterations));
+  solution.set_residual_mm(answer.residual_mm);
+}
+
+void JacobianToWire(const Hexapod& hexapod, const Pose& X_MT, v1::ComputeJacobianResponse& wire) {
+  const Pose X_MP = PlatformFromTool(hexapod, X_MT);
+  const PoseJacobian J = ActuatorJacobian(hexapod, X_MP);
+  if (!J.allFinite()) {
+    return RefusalToWire(Reason::kSingular, 0.0, -1, *wire.mutable_refusal());
+  }
+  const HexapodSingularity singularity = AnalyseSingularity(hexapod, X_MP);
+  v1::JacobianSolution& solution = *wire.mutable_solution();
+  MatrixToWire(J, *solution.mutable_j_q_x());
+  MatrixToWire(ActuatorParameterJacobian(hexapod, X_MP), *solution.mutable_j_q_parameters());
+  for (int i = 0; i < kStrutParameters; ++i) {
+    solution.add_parameter_name(std::string(StrutParameterName(static_cast<StrutParameter>(i))));
+  }
+  solution.set_determinant(singularity.determinant);
+  solution.set_smallest_singular_value(singularity.smallest_singular_value);
+  if (std::isfinite(singularity.condition) && singularity.condition < 1e12) {
+    solution.set_condition(singularity.condition);
+    MatrixToWire(J.inverse().eval(), *solution.mutable_j_x_q());
+  }
+}
+
+void SingularityToWire(const Hexapod& hexapod, const Pose& X_MT, v1::ReportSingularityResponse& wire) {
+  const HexapodSingularity answer = AnalyseSingularity(hexapod, PlatformFromTool(hexapod, X_MT));
+  if (!std::isfinite(answer.determinant)) {
+    return RefusalToWire(Reason::kSingular, 0.0, -1, *wire.mutable_refusal());
+  }
+  v1::SingularitySolution& solution = *wire.mutable_solution();
+  solution.set_type(answer.signed_margin > hexapod.geometry().limits.singular_margin
+                        ? v1::SINGULARITY_TYPE_REGULAR
+                        : v1::SINGULARITY_TYPE_PARALLEL);
+  solution.set_determinant(answer.determinant);
+  solution.set_condition(std::isfinite(answer.condition) ? answer.condition : 0.0);
+  solution.set_smallest_singular_value(answer.smallest_singular_value);
+  solution.set_characteristic_length_mm(answer.characteristic_length_mm);
+  solution.set_signed_margin(answer.signed_margin);
+}
+
+ServiceAreaMachine FromWire(const v1::ComputeServiceAreaRequest& wire, double value, ArgumentChecks& checks) {
+  ServiceAreaMachine machine;
+  for (const auto& [name, number] : wire.parameter()) {
+    SetServiceNumber(name, number, "parameter." + name.substr(0, 64), machine, checks);
+  }
+  if (!wire.sweep_parameter().empty()) {
+    SetServiceNumber(wire.sweep_parameter(), value, "sweep_parameter", machine, checks);
+  }
+  if (checks.ok()) {
+    const std::string_view fault = FaultOf(machine);
+    checks.Require(fault.empty(), "parameter", "BAD_GEOMETRY", std::string(fault));
+  }
+  return machine;
+}
+
+void ToWire(const ServiceAreaMachine& machine, double value, v1::ServiceArea& wire) {
+  wire.set_parameter_value(value);
+  const PaperServiceArea paper = PaperClosedForm(machine);
+  if (paper.defined) {
+    wire.set_paper_mm2(paper.area_mm2);
+    for (const double part : {paper.s1_mm2, paper.s2_mm2, paper.s3_mm2, paper.s4_mm2}) {
+      wire.add_part_mm2(part);
+    }
+  }
+  wire.set_union_mm2(ExactArea(machine, ServiceRegion::kUnion));
+  wire.set_intersection_mm2(ExactArea(machine, ServiceRegion::kIntersection));
+  wire.set_single_tilt_mm2(ExactArea(machine, ServiceRegion::kSingleTilt));
+}
+
+}  // namespace lambdajet::kinematics
