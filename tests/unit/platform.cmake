@@ -3,3 +3,4 @@ lambdajet_check(platform_machine_file_test LABELS unit SOURCES platform_machine_
 lambdajet_check(platform_config_test LABELS unit SOURCES platform_config_test.cpp DEPS platform_config test_support)
 lambdajet_check(platform_process_test LABELS unit SOURCES platform_process_test.cpp DEPS platform_process test_support)
 lambdajet_check(platform_guard_test LABELS unit SOURCES platform_guard_test.cpp DEPS platform_bus test_support)
+lambdajet_check(platform_hexapod_file_test LABELS unit SOURCES platform_hexapod_file_test.cpp DEPS platform_machine_file)
