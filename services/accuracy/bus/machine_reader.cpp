@@ -37,6 +37,10 @@ absl::StatusOr<MachineDescription> FromWire(const wire::MachineDescription& samp
                    faults.front().key + " is " + std::to_string(faults.front().value) + "; should be " +
                        faults.front().should);
   }
+  if (MachineHash(*machine) != machine->hash) {
+    return Trouble(absl::StatusCode::kDataLoss, "DESCRIPTION_HASH_MISMATCH",
+                   "the description hashes to " + MachineHash(*machine) + ", its writer says " + machine->hash);
+  }
   return machine;
 }
 
