@@ -151,7 +151,7 @@ Rectangle LargestRectangle(std::span<const Outline> outlines) {
   for (int i = 0; i < 8 && !(exact.area_mm2() > 0.0); ++i, inset += 0.5 * cell) {
     exact = Widest(outlines, best.y_min_mm + inset, best.y_max_mm - inset, middle);
   }
-  for (double step = 4.0 * cell; step > 1e-3; step *= 0.5) {
+  for (double step = 4.0 * cell; step > 1e-4; step *= 0.5) {
     for (bool improved = true; improved;) {
       improved = false;
       const double x_mid = 0.5 * (exact.x_min_mm + exact.x_max_mm);

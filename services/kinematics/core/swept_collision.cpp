@@ -89,21 +89,30 @@ namespace {
 double FirstContact(Corners sheet, const Vector2d& from, const Vector2d& to, Corners body, double margin_mm,
                     double& nearest) {
   constexpr double kTouchMm = 1e-6;
+  constexpr double kLeastStepMm = 1e-3;
   const double length = (to - from).norm();
+  const auto at = [&](double fraction) { return Distance(sheet, from + fraction * (to - from), body); };
+  double free = 0.0;  // the last fraction without contact
   double fraction = 0.0;
   while (true) {
-    const double distance = Distance(sheet, from + fraction * (to - from), body);
+    const double distance = at(fraction);
     nearest = std::min(nearest, distance);
     if (distance <= margin_mm + kTouchMm) {
-      return fraction;
+      break;
     }
     if (fraction >= 1.0 || length == 0.0) {
       return 2.0;
     }
-    // Steps of at least a micrometre end the search beside a body that is passed closely; half the distance beyond the
-    // margin otherwise, so that the smallest clearance is met to within a third.
-    fraction = std::min(1.0, fraction + std::max(0.5 * (distance - margin_mm), 1e-3) / length);
+    // Half the distance beyond the margin, so that the smallest clearance is met to within a third; at least a micrometre,
+    // which ends the search beside a body that is passed closely.
+    free = fraction;
+    fraction = std::min(1.0, fraction + std::max(0.5 * (distance - margin_mm), kLeastStepMm) / length);
   }
+  for (int i = 0; i < 30 && (fraction - free) * length > kTouchMm; ++i) {
+    const double middle = 0.5 * (free + fraction);
+    (at(middle) <= margin_mm + kTouchMm ? fraction : free) = middle;
+  }
+  return fraction;
 }
 
 }  // namespace

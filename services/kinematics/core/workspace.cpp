@@ -181,7 +181,7 @@ bool FindCorner(const LambdaMechanism& m, PoseLimit a, PoseLimit b, double step_
     }
     const Vector2d step((gb.y() * f.x() - ga.y() * f.y()) / det, (ga.x() * f.y() - gb.x() * f.x()) / det);
     p -= step;
-    if (!((p - start).norm() < 2.0 * step_mm)) {
+    if (!((p - start).norm() < 10.0 * step_mm)) {
       return false;
     }
     if (step.norm() < 1e-7) {
@@ -214,10 +214,15 @@ void Refine(const LambdaMechanism& m, const Vector2d& a, const Vector2d& b, cons
   }
   const Vector2d inward = Vector2d(-edge.y(), edge.x()) / length;
   const bool usable = FindUsableMargin(m, middle).margin_mm >= 0.0;
-  const double reach = 0.5 * length;
-  Vector2d other = middle + (usable ? -reach : reach) * inward;
-  if ((FindUsableMargin(m, other).margin_mm >= 0.0) == usable) {
-    return;  // no boundary across this edge within half its length: the grid's own crossing stands
+  // Near a sharp corner a long step across would leave the region on its far side.
+  Vector2d other = middle;
+  bool across = false;
+  for (double reach = 0.5 * length; !across && reach > 0.02 * length; reach *= 0.3) {
+    other = middle + (usable ? -reach : reach) * inward;
+    across = (FindUsableMargin(m, other).margin_mm >= 0.0) != usable;
+  }
+  if (!across) {
+    return;  // no boundary near this edge: the grid's own crossings stand
   }
   const Vector2d on = usable ? Crossing(m, middle, other) : Crossing(m, other, middle);
   if ((on - middle).norm() > 0.25 * options.tolerance_mm || length > 4.0 * options.grid_mm) {
@@ -245,17 +250,30 @@ double AreaOf(const Outline& outline) {
   return 0.5 * twice;
 }
 
-// The limit with the smallest margin along one side of the rectangle.
+// What stops one side: of the limits that it touches, the one that lies nearest to it over its whole length.
 PoseLimit BindingOn(const LambdaMechanism& m, const Vector2d& from, const Vector2d& to) {
   constexpr int kSamples = 200;
-  UsableMargin tightest{std::numeric_limits<double>::max(), PoseLimit::kMainLink};
+  constexpr double kTouchMm = 0.2;
+  Margins least, mean;
+  least.fill(std::numeric_limits<double>::max());
+  mean.fill(0.0);
   for (int i = 0; i <= kSamples; ++i) {
-    const UsableMargin here = FindUsableMargin(m, from + (to - from) * (static_cast<double>(i) / kSamples));
-    if (here.margin_mm < tightest.margin_mm) {
-      tightest = here;
+    const Margins here = AllMargins(m, from + (to - from) * (static_cast<double>(i) / kSamples));
+    for (std::size_t k = 0; k < kPoseLimits; ++k) {
+      least[k] = std::min(least[k], here[k]);
+      mean[k] += std::min(here[k], 1e9) / (kSamples + 1);
     }
   }
-  return tightest.tightest;
+  const double touch = *std::min_element(least.begin(), least.end()) + kTouchMm;
+  std::size_t binding = 0;
+  double nearest = std::numeric_limits<double>::max();
+  for (std::size_t k = 0; k < kPoseLimits; ++k) {
+    if (least[k] <= touch && mean[k] < nearest) {
+      nearest = mean[k];
+      binding = k;
+    }
+  }
+  return static_cast<PoseLimit>(binding);
 }
 
 std::array<PoseLimit, 4> BindingOf(const LambdaMechanism& m, const Rectangle& r) {

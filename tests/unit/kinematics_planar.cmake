@@ -1,0 +1,2 @@
+lambdajet_check(unit_kinematics_workspace LABELS unit TIMEOUT 180
+  SOURCES kinematics_workspace_test.cpp DEPS kinematics_core kinematics_optimisation)
