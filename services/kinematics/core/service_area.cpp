@@ -293,17 +293,23 @@ Crossings CrossingsOf(const Scene& scene, const Curves& curves) {
   return xs;
 }
 
-// Area between two neighbouring crossings, where the curves keep their order.
-double SliceArea(const Scene& scene, const Curves& curves, ServiceRegion region, double from, double to) {
-  const double middle = 0.5 * (from + to);
-  Few<const Curve*, kCurves> here;
+using CurvesHere = Few<const Curve*, kCurves>;
+
+CurvesHere CurvesAt(const Curves& curves, double x) {
+  CurvesHere here;
   for (const Curve& curve : curves) {
-    if (curve.Reaches(middle)) {
+    if (curve.Reaches(x)) {
       here.Add(&curve);
     }
   }
-  std::sort(here.begin(), here.end(),
-            [middle](const Curve* p, const Curve* q) { return p->At(middle) < q->At(middle); });
+  std::sort(here.begin(), here.end(), [x](const Curve* p, const Curve* q) { return p->At(x) < q->At(x); });
+  return here;
+}
+
+// Area between two neighbouring crossings, where the curves keep their order.
+double SliceArea(const Scene& scene, const Curves& curves, ServiceRegion region, double from, double to) {
+  const double middle = 0.5 * (from + to);
+  const CurvesHere here = CurvesAt(curves, middle);
   double area = 0.0;
   for (std::size_t i = 0; i + 1 < here.size(); ++i) {
     const double y = 0.5 * (here[i]->At(middle) + here[i + 1]->At(middle));
@@ -382,6 +388,37 @@ double ExactArea(const ServiceAreaMachine& machine, ServiceRegion region) {
   }
   return area;
 }
+
+ServiceSpans RegionAt(const ServiceAreaMachine& machine, ServiceRegion region, double x_mm) {
+  const Scene scene(machine);
+  const Curves curves = CurvesOf(scene);
+  const CurvesHere here = CurvesAt(curves, x_mm);
+  ServiceSpans spans;
+  bool open = false;
+  for (std::size_t i = 0; i + 1 < here.size(); ++i) {
+    const double low = here[i]->At(x_mm);
+    const double high = here[i + 1]->At(x_mm);
+    const bool inside = high > low && scene.Inside(region, x_mm, 0.5 * (low + high));
+    if (inside && !open && spans.count < kMostServiceSpans) {
+      spans.from_y_mm[spans.count++] = low;
+      open = true;
+    }
+    if (inside && open) {
+      spans.to_y_mm[spans.count - 1] = high;
+    }
+    open = open && (inside || high == low);
+  }
+  return spans;
+}
+
+ServicePoint ArcCentre(const ServiceAreaMachine& machine, int joint, int tilt_sign) {
+  const Scene scene(machine);
+  const std::size_t tilt = tilt_sign > 0 ? 0 : 1;
+  const Circle& centre = joint == 1 ? scene.first[tilt] : scene.second[tilt];
+  return {centre.x, centre.y};
+}
+
+ServicePoint ClosedFormOrigin(const ServiceAreaMachine& machine) { return ArcCentre(machine, 1, 1); }
 
 bool InRegion(const ServiceAreaMachine& machine, ServiceRegion region, double x_mm, double y_mm) {
   return Scene(machine).Inside(region, x_mm, y_mm);

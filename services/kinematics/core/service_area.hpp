@@ -59,6 +59,23 @@ enum class ServiceRegion {
 std::string_view RegionName(ServiceRegion region);
 
 double ExactArea(const ServiceAreaMachine& machine, ServiceRegion region);
+// Where the region lies on the line x: `count` spans of y, at most kMostServiceSpans, by rising y.
+inline constexpr int kMostServiceSpans = 8;
+struct ServiceSpans {
+  int count = 0;
+  double from_y_mm[kMostServiceSpans] = {};
+  double to_y_mm[kMostServiceSpans] = {};
+};
+ServiceSpans RegionAt(const ServiceAreaMachine& machine, ServiceRegion region, double x_mm);
+
+// c1 of +phi, where the closed form's coordinates have their origin.
+struct ServicePoint {
+  double x_mm = 0.0, y_mm = 0.0;
+};
+ServicePoint ClosedFormOrigin(const ServiceAreaMachine& machine);
+// Centres of the arcs for a tool tip: joint 1 and 2, tilt +phi and -phi.
+ServicePoint ArcCentre(const ServiceAreaMachine& machine, int joint, int tilt_sign);
+
 bool InRegion(const ServiceAreaMachine& machine, ServiceRegion region, double x_mm, double y_mm);
 
 enum class ServiceParameter { kTilt, kPlatformSpacing, kStrutMin, kStrutMax, kToolLength, kBaseSpacing };

@@ -1,0 +1,2 @@
+lambdajet_check(system_kinematics_hexapod_cli LABELS system SOURCES kinematics_hexapod_cli_test.cpp)
+add_dependencies(system_kinematics_hexapod_cli lambdajet_program)
