@@ -24,11 +24,11 @@
 namespace lambdajet {
 
 struct ChannelOptions {
-  std::string address;
-  std::string ca_file;           // PEM; empty: plaintext
-  std::string certificate_file;  // our own, for mTLS
-  std::string key_file;
-  std::string server_name;  // in the server's certificate, if not the address
+  std::string address = {};
+  std::string ca_file = {};           // PEM; empty: plaintext
+  std::string certificate_file = {};  // our own, for mTLS
+  std::string key_file = {};
+  std::string server_name = {};  // in the server's certificate, if not the address
   int most_message_mib = 16;
 };
 
