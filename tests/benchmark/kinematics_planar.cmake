@@ -2,3 +2,7 @@ add_executable(benchmark_kinematics_planar kinematics_planar_benchmark.cpp)
 lambdajet_own_code(benchmark_kinematics_planar)
 target_compile_options(benchmark_kinematics_planar PRIVATE -fno-math-errno -fno-trapping-math)
 target_link_libraries(benchmark_kinematics_planar PRIVATE kinematics_core)
+
+add_executable(benchmark_kinematics_rpc kinematics_rpc_benchmark.cpp)
+lambdajet_own_code(benchmark_kinematics_rpc)
+target_link_libraries(benchmark_kinematics_rpc PRIVATE kinematics_rpc)
