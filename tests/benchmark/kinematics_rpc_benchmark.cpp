@@ -9,6 +9,7 @@
 #include <chrono>
 #include <cstdio>
 #include <memory>
+#include <mutex>
 #include <random>
 #include <string>
 #include <thread>
@@ -60,13 +61,47 @@ class Echo final : public RawService {
   class Reactor final : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer> {
    public:
     explicit Reactor(const grpc::ByteBuffer& answer) : answer_(answer) { StartRead(&request_); }
-    void OnReadDone(bool ok) override { ok ? StartWrite(&answer_) : Finish(grpc::Status::OK); }
-    void OnWriteDone(bool ok) override { ok ? StartRead(&request_) : Finish(grpc::Status::OK); }
+    void OnReadDone(bool ok) override {
+      const std::lock_guard lock(mutex_);
+      if (ok) {
+        ++owed_;
+        StartRead(&request_);
+      } else {
+        ended_ = true;
+      }
+      Continue();
+    }
+    void OnWriteDone(bool ok) override {
+      const std::lock_guard lock(mutex_);
+      writing_ = false;
+      ended_ = ended_ || !ok;
+      Continue();
+    }
     void OnDone() override { delete this; }
 
    private:
+    // Reads on while it writes, as the real stream does.
+    void Continue() {
+      if (writing_ || finished_) {
+        return;
+      }
+      if (owed_ > 0) {
+        --owed_;
+        writing_ = true;
+        StartWrite(&answer_);
+      } else if (ended_) {
+        finished_ = true;
+        Finish(grpc::Status::OK);
+      }
+    }
+
+    std::mutex mutex_;
     grpc::ByteBuffer request_;
     grpc::ByteBuffer answer_;
+    int owed_ = 0;
+    bool writing_ = false;
+    bool ended_ = false;
+    bool finished_ = false;
   };
 
   grpc::ByteBuffer unary_;
