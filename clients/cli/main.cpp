@@ -1,29 +1,39 @@
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 
+#include "clients/cli/service_verbs.hpp"
 #include "clients/cli/verbs.hpp"
 
 using namespace lambdajet::cli;
 
 int main(int count, char** words) {
   Output output(stdout, stderr);
-  CLI::App app("lambdajet: ask the open-base water-jet machine and its calculations.");
+  Connections connections;
+  CLI::App app("lambdajet: ask the open-base water-jet machine and its calculations.", "lambdajet");
   app.footer(kExitCodesHelp);
   app.fallthrough();
   app.require_subcommand(1);
   app.add_flag("--json", output.options().json, "one JSON value (or one per line) instead of text");
   app.add_flag("--quiet", output.options().quiet, "no messages, no progress");
-
-  const auto noun = [&](const char* name, const char* what, auto... add) {
-    CLI::App* sub = app.add_subcommand(name, what)->require_subcommand(1);
-    (add(*sub, output), ...);
+  connections.AddOptions(app);
+  const auto noun = [&](const char* name, const char* what) -> CLI::App& {
+    return *app.add_subcommand(name, what)->require_subcommand(1);
   };
-  noun("kinematics", "poses, sliders, singularities, workspace", AddKinematicsVerbs);
-  noun("trajectory", "part programs, plans, idle motion", AddTrajectoryVerbs);
-  noun("calibration", "measuring, identification, versions", AddCalibrationVerbs);
-  noun("accuracy", "predicted contour error, budget, error map", AddAccuracyVerbs);
-  noun("inspection", "the contour really cut against the drawing", AddInspectionVerbs);
-
+  CLI::App& trajectory = noun("trajectory", "part programs, plans, idle motion");
+  CLI::App& calibration = noun("calibration", "measuring, identification, versions");
+  CLI::App& accuracy = noun("accuracy", "predicted contour error, budget, error map");
+  CLI::App& inspection = noun("inspection", "the contour really cut against the drawing");
+  AddKinematicsVerbs(noun("kinematics", "poses, sliders, singularities, workspace"), output);
+  AddTrajectoryVerbs(trajectory, output);
+  AddTrajectoryServiceVerbs(trajectory, output, connections);
+  AddCalibrationVerbs(calibration, output);
+  AddCalibrationServiceVerbs(calibration, output, connections);
+  AddAccuracyVerbs(accuracy, output);
+  AddAccuracyServiceVerbs(accuracy, output, connections);
+  AddInspectionVerbs(inspection, output);
+  AddInspectionServiceVerbs(inspection, output, connections);
+  AddJobVerbs(noun("job", "jobs of the cell: submit, start, follow, report"), output, connections);
+  AddMachineVerbs(noun("machine", "both modules and every veto; reset"), output, connections);
   try {
     app.parse(count, words);
   } catch (const CLI::ParseError& error) {

@@ -31,7 +31,7 @@ def reference(cell):
 def submit(cell, name, program, compensate, request_id):
     """Stores the job and waits until it is planned."""
     job = cell.jobs.SubmitJob(
-        cell_pb2.SubmitJobRequest(request_id=request_id, name=name, program=program, compensate=compensate),
+        cell_pb2.SubmitJobRequest(request_id=request_id, name=name, program=program.encode(), compensate=compensate),
         timeout=RPC_TIMEOUT_S,
     ).job
     deadline = time.monotonic() + 120

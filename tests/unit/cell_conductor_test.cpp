@@ -4,129 +4,13 @@
 #include <map>
 
 #include "cell/core/conductor.hpp"
+#include "tests/support/cell_machine_model.hpp"
 
 namespace lambdajet::cell {
 namespace {
 
-constexpr std::uint64_t kSession = 4711;
+constexpr std::uint64_t kSession = kModelSession;
 constexpr std::int64_t kStep_ns = 20'000'000;
-
-// Both modules as far as the cell can see them: they obey the words of module_words.hpp and echo commands.
-class MachineModel {
- public:
-  MachineModel() {
-    view.drive.emplace();
-    view.main_motion.emplace();
-    view.drive->session = 1;
-    view.main_motion->session = 2;
-    view.drive->mode = view.main_motion->mode = ModuleMode::kSafe;
-  }
-
-  void Obey(const CommandOut& command, std::int64_t now_ns) {
-    if ((command.targets & kDriveTarget) != 0 && !drive_deaf) {
-      Obey(*view.drive, command, now_ns);
-      if (command.verb == Verb::kHome) {
-        view.drive->referenced = true;
-      }
-      if (command.verb == Verb::kOverride) {
-        view.drive->feed_override = command.value;
-      }
-    }
-    if ((command.targets & kMainMotionTarget) != 0) {
-      Obey(*view.main_motion, command, now_ns);
-    }
-  }
-
-  void Advance(std::int64_t now_ns) {
-    for (ModuleView* module :
-         {static_cast<ModuleView*>(&*view.drive), static_cast<ModuleView*>(&*view.main_motion)}) {
-      if (module->mode == ModuleMode::kStopping) {
-        module->mode = ModuleMode::kStopped;
-      }
-      if (module->mode == ModuleMode::kArmed && start_at_ns != 0 && now_ns >= start_at_ns) {
-        module->mode = ModuleMode::kRunning;
-      }
-    }
-    if (view.drive->mode == ModuleMode::kRunning) {
-      view.drive->s_mm += 1.0;
-      view.main_motion->s_mm = view.drive->s_mm;
-      if (view.drive->s_mm >= length_mm) {
-        view.drive->mode = view.main_motion->mode = ModuleMode::kComplete;
-      }
-    }
-    if (!drive_silent) {
-      view.drive->heard_ns = now_ns;
-    }
-    if (!main_motion_silent) {
-      view.main_motion->heard_ns = now_ns;
-    }
-  }
-
-  void Stream(std::uint64_t plan) {
-    view.drive->next_segment = 100;
-    view.drive->buffered_s = 2.0;
-    view.main_motion->next_event = 10;
-    view.main_motion->next_gate = 3;
-    EXPECT_EQ(view.drive->plan, plan);
-  }
-
-  MachineView view;
-  double length_mm = 50.0;
-  std::int64_t start_at_ns = 0;
-  bool drive_deaf = false;
-  bool drive_silent = false;
-  bool main_motion_silent = false;
-  ModuleReason refuse_arm = ModuleReason::kNone;
-
- private:
-  void Obey(ModuleView& module, const CommandOut& command, std::int64_t) {
-    module.echo = {kSession, command.sequence_number, 1, ModuleReason::kNone};
-    switch (command.verb) {
-      case Verb::kHome:
-      case Verb::kReset:
-        module.mode =
-            command.verb == Verb::kReset && !view.drive->referenced ? ModuleMode::kSafe : ModuleMode::kReady;
-        module.reason = ModuleReason::kNone;
-        break;
-      case Verb::kLoad:
-        module.plan = command.plan.plan_id;
-        module.mode = ModuleMode::kReady;
-        view.drive->s_mm = 0.0;
-        view.main_motion->s_mm = 0.0;
-        start_at_ns = 0;
-        break;
-      case Verb::kUnload:
-        module.plan = 0;
-        module.mode = ModuleMode::kReady;
-        break;
-      case Verb::kArm:
-        if (refuse_arm != ModuleReason::kNone) {
-          module.echo.answer = 2;
-          module.echo.reason = refuse_arm;
-        } else {
-          module.mode = ModuleMode::kArmed;
-        }
-        break;
-      case Verb::kStart:
-        start_at_ns = command.start_at_ns;
-        break;
-      case Verb::kHold:
-        module.mode = ModuleMode::kHeld;
-        module.reason = ModuleReason::kCommanded;
-        break;
-      case Verb::kResume:
-        module.mode = ModuleMode::kRunning;
-        module.reason = ModuleReason::kNone;
-        break;
-      case Verb::kStop:
-        module.mode = ModuleMode::kStopping;
-        module.reason = ModuleReason::kCommanded;
-        break;
-      default:
-        break;
-    }
-  }
-};
 
 class ConductorTest : public testing::Test {
  protected:
@@ -165,7 +49,8 @@ class ConductorTest : public testing::Test {
       } else if (const auto* streaming = std::get_if<StreamingWanted>(&action)) {
         ++streaming_asked;
         if (streams) {
-          machine.Stream(streaming->plan_id);
+          EXPECT_EQ(machine.view.drive->plan, streaming->plan_id);
+          machine.Fill();
         }
         conductor.Take(StreamingOutcome{streaming->job_id, streaming->plan_id, "", ""}, now_ns);
       } else {

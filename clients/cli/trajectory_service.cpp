@@ -1,0 +1,261 @@
+// Part programs and plans over TrajectoryService: check, plan, show, samples.
+#include "clients/cli/trajectory_service.hpp"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <thread>
+
+#include "clients/cli/csv.hpp"
+#include "clients/cli/service_verbs.hpp"
+#include "clients/cli/text_file.hpp"
+#include "foundation/contract/trouble.hpp"
+#include "lambdajet/trajectory/v1/trajectory.grpc.pb.h"
+
+namespace lambdajet::cli {
+namespace {
+
+namespace v1 = trajectory::v1;
+using v1::TrajectoryService;
+
+constexpr auto kPoll = std::chrono::milliseconds(50);
+
+struct ProgramOptions {
+  std::string file;
+  bool compensate = false;
+  std::optional<double> tolerance_mm;
+  std::optional<double> feed_scale;
+  std::optional<double> start_from_s_mm;
+  std::optional<double> overlap_mm;
+  std::optional<std::uint32_t> machine_version;
+};
+
+void AddProgramOptions(CLI::App& verb, ProgramOptions& options) {
+  verb.add_option("FILE", options.file, "G-code; - is standard input")->required();
+  verb.add_flag("--compensate", options.compensate, "elastic feed-forward, corner feed from predicted error");
+  verb.add_option("--tolerance-mm", options.tolerance_mm,
+                  "predicted contour error allowed with --compensate");
+  verb.add_option("--feed-scale", options.feed_scale, "factor on programmed feeds, up to 1.2");
+  verb.add_option("--start-from-s-mm", options.start_from_s_mm, "path length already cut");
+  verb.add_option("--overlap-mm", options.overlap_mm, "with --start-from-s-mm: back up this far");
+  verb.add_option("--machine-version", options.machine_version, "only with this version of the machine");
+}
+
+v1::PlanOptions ToWire(const ProgramOptions& options) {
+  v1::PlanOptions wire;
+  wire.set_compensate(options.compensate);
+  if (options.tolerance_mm) wire.set_tolerance_mm(*options.tolerance_mm);
+  if (options.feed_scale) wire.set_feed_scale(*options.feed_scale);
+  if (options.start_from_s_mm) wire.set_start_from_s_mm(*options.start_from_s_mm);
+  if (options.overlap_mm) wire.set_overlap_mm(*options.overlap_mm);
+  if (options.machine_version) wire.set_machine_version(*options.machine_version);
+  return wire;
+}
+
+void PrintFaults(const google::protobuf::RepeatedPtrField<v1::ProgramFault>& faults, Output& output) {
+  for (const v1::ProgramFault& fault : faults) {
+    output.Text(fmt::format("line {}, column {}: {}: {}", fault.line(), fault.column(), fault.reason(),
+                            fault.message()),
+                Tone::kBad);
+  }
+}
+
+void PrintSummary(const v1::PlanSummary& plan, Output& output) {
+  output.Table({{"what", "value", "unit"},
+                {{"plan", std::to_string(plan.plan_id()), ""},
+                 {"machine version", std::to_string(plan.model_version().version()), ""},
+                 {"duration without gates", Fixed(plan.duration_s(), 2), "s"},
+                 {"gates", Fixed(plan.gate_time_s(), 2), "s"},
+                 {"cutting", Fixed(plan.cutting_time_s(), 2), "s"},
+                 {"path", Fixed(plan.length_mm(), 1), "mm"},
+                 {"jet on", Fixed(plan.cutting_length_mm(), 1), "mm"},
+                 {"segments", std::to_string(plan.segment_count()), ""},
+                 {"gates and events", fmt::format("{} and {}", plan.gate_count(), plan.event_count()), ""},
+                 {"compensated", plan.compensated() ? "yes" : "no", ""},
+                 {"contour tolerance used", Fixed(plan.contour_tolerance_used_mm(), 4), "mm"},
+                 {"predicted 95 % bound", Fixed(plan.predicted_95_mm(), 4), "mm"}}});
+  TextTable limits{{"limit", "length_mm", "share_%"}, {}};
+  for (const v1::BindingLimit& limit : plan.binding_limits()) {
+    limits.rows.push_back({limit.limit(), Fixed(limit.length_mm(), 1), Fixed(limit.share() * 100, 1)});
+  }
+  if (!limits.rows.empty()) {
+    output.Text("");
+    output.Table(limits);
+  }
+}
+
+absl::Status Check(const ProgramOptions& options, const Connections& connections, Output& output) {
+  const auto program = ReadTextFile(options.file);
+  if (!program.ok()) {
+    return program.status();
+  }
+  v1::AdmitProgramRequest request;
+  request.set_program(*program);
+  *request.mutable_options() = ToWire(options);
+  v1::AdmitProgramResponse response;
+  const absl::Status status = connections.Ask<TrajectoryService>(
+      "trajectory", &TrajectoryService::Stub::AdmitProgram, request, response);
+  if (!status.ok()) {
+    return status;
+  }
+  PrintJson(response, output);
+  PrintFaults(response.faults(), output);
+  output.Text(
+      response.admitted()
+          ? fmt::format("admitted: {:.1f} mm with the jet on, {:.1f} mm off, {} pierces, machine version {}",
+                        response.cutting_length_mm(), response.idle_length_mm(), response.pierces(),
+                        response.model_version().version())
+          : "refused",
+      response.admitted() ? Tone::kGood : Tone::kBad);
+  output.Exit(response.admitted() ? ExitCode::kOk : ExitCode::kRefused);
+  return absl::OkStatus();
+}
+
+absl::Status Show(const v1::GetPlanResponse& plan, Output& output) {
+  if (output.json()) {
+    PrintJson(plan, output);
+  } else if (plan.has_summary()) {
+    PrintSummary(plan.summary(), output);
+  } else {
+    PrintFaults(plan.faults(), output);
+    output.Text(fmt::format("{:.0f} % {} {} {}", plan.operation().progress() * 100, plan.operation().phase(),
+                            plan.operation().reason(), plan.operation().message()));
+  }
+  const bool failed = plan.operation().state() == type::v1::OPERATION_STATE_FAILED;
+  output.Exit(failed ? ExitCode::kRefused : ExitCode::kOk);
+  return absl::OkStatus();
+}
+
+absl::Status Plan(const ProgramOptions& options, const Connections& connections, Output& output) {
+  const auto program = ReadTextFile(options.file);
+  if (!program.ok()) {
+    return program.status();
+  }
+  v1::PlanProgramRequest request;
+  request.set_program(*program);
+  *request.mutable_options() = ToWire(options);
+  v1::PlanProgramResponse asked;
+  absl::Status status =
+      connections.Ask<TrajectoryService>("trajectory", &TrajectoryService::Stub::PlanProgram, request, asked);
+  v1::GetPlanRequest get;
+  get.set_plan_id(asked.plan_id());
+  while (status.ok()) {
+    v1::GetPlanResponse plan;
+    status = connections.Ask<TrajectoryService>("trajectory", &TrajectoryService::Stub::GetPlan, get, plan);
+    if (status.ok() && plan.operation().state() != type::v1::OPERATION_STATE_RUNNING) {
+      output.EndProgress();
+      return Show(plan, output);
+    }
+    output.Progress(plan.operation().progress(), plan.operation().phase());
+    std::this_thread::sleep_for(kPoll);
+  }
+  return status;
+}
+
+absl::Status Samples(std::uint64_t plan_id, std::optional<double> step_s, const std::string& out,
+                     const Connections& connections) {
+  PlanPoints points;
+  absl::Status status = ReadPlanPoints(connections, plan_id, step_s, points);
+  if (!status.ok()) {
+    return status;
+  }
+  std::vector<std::string> columns = {"tau_s",
+                                      "s_mm",
+                                      "x_W_mm",
+                                      "y_W_mm",
+                                      "vx_W_mm_per_s",
+                                      "vy_W_mm_per_s",
+                                      "ax_W_mm_per_s2",
+                                      "ay_W_mm_per_s2",
+                                      "actuator_1_mm",
+                                      "actuator_2_mm",
+                                      "actuator_1_mm_per_s",
+                                      "actuator_2_mm_per_s",
+                                      "cutting",
+                                      "source_line"};
+  CsvTable table(columns);
+  for (std::size_t i = 0; i < points.cutting.size(); ++i) {
+    const auto first = points.values.begin() + static_cast<std::ptrdiff_t>(i * kPlanPointStride);
+    std::vector<double> row(first, first + kPlanPointStride);
+    row.push_back(points.cutting[i]);
+    row.push_back(points.source_line[i]);
+    table.AddRow(row);
+  }
+  return WriteCsv(out, table);
+}
+
+}  // namespace
+
+absl::Status ReadPlanPoints(const Connections& connections, std::uint64_t plan_id,
+                            std::optional<double> step_s, PlanPoints& points) {
+  const auto channel = connections.Open("trajectory");
+  if (!channel.ok()) {
+    return channel.status();
+  }
+  TrajectoryService::Stub stub(*channel);
+  grpc::ClientContext context;
+  SetDeadline(context, connections.timeout_s());
+  v1::StreamSamplesRequest request;
+  request.set_plan_id(plan_id);
+  if (step_s) {
+    request.set_step_s(*step_s);
+  }
+  const auto stream = stub.StreamSamples(&context, request);
+  v1::SampleBatch batch;
+  while (stream->Read(&batch)) {
+    points.values.insert(points.values.end(), batch.values().begin(), batch.values().end());
+    points.cutting.insert(points.cutting.end(), batch.cutting().begin(), batch.cutting().end());
+    points.source_line.insert(points.source_line.end(), batch.source_line().begin(),
+                              batch.source_line().end());
+  }
+  absl::Status status = connections.Named("trajectory", FromWire(stream->Finish()));
+  if (status.ok() && (points.values.size() != points.cutting.size() * kPlanPointStride ||
+                      points.source_line.size() != points.cutting.size())) {
+    return Trouble(absl::StatusCode::kInternal, "BAD_SAMPLES",
+                   "trajectory's samples do not have the stride that they should");
+  }
+  return status;
+}
+
+void AddTrajectoryServiceVerbs(CLI::App& noun, Output& output, const Connections& connections) {
+  auto checked = std::make_shared<ProgramOptions>();
+  CLI::App* check =
+      AddServiceVerb(noun, "check", "ask trajectory whether a program can be cut; exit code 4 if not");
+  AddProgramOptions(*check, *checked);
+  check->callback([checked, &output, &connections] {
+    if (const absl::Status status = Check(*checked, connections, output); !status.ok()) output.Fail(status);
+  });
+
+  auto planned = std::make_shared<ProgramOptions>();
+  CLI::App* plan = AddServiceVerb(noun, "plan", "have trajectory plan a program; time, feed, what limits it");
+  AddProgramOptions(*plan, *planned);
+  plan->callback([planned, &output, &connections] {
+    if (const absl::Status status = Plan(*planned, connections, output); !status.ok()) output.Fail(status);
+  });
+
+  auto shown = std::make_shared<v1::GetPlanRequest>();
+  auto shown_id = std::make_shared<std::uint64_t>(0);
+  CLI::App* show = AddServiceVerb(noun, "show", "a plan that trajectory has");
+  show->add_option("PLAN", *shown_id, "the plan's id")->required();
+  show->callback([shown, shown_id, &output, &connections] {
+    shown->set_plan_id(*shown_id);
+    v1::GetPlanResponse response;
+    absl::Status status =
+        connections.Ask<TrajectoryService>("trajectory", &TrajectoryService::Stub::GetPlan, *shown, response);
+    status.Update(status.ok() ? Show(response, output) : absl::OkStatus());
+    if (!status.ok()) output.Fail(status);
+  });
+
+  auto sampled = std::make_shared<std::uint64_t>(0);
+  auto step = std::make_shared<std::optional<double>>();
+  auto out = std::make_shared<std::string>("-");
+  CLI::App* samples = AddServiceVerb(noun, "samples", "a plan's points over time as CSV");
+  samples->add_option("PLAN", *sampled, "the plan's id")->required();
+  samples->add_option("--step-s", *step, "distance in program time; default 0.004");
+  samples->add_option("--out", *out, "CSV; - is standard output");
+  samples->callback([sampled, step, out, &output, &connections] {
+    output.Finish(Samples(*sampled, *step, *out, connections));
+  });
+}
+
+}  // namespace lambdajet::cli
