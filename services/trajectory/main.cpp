@@ -1,0 +1,37 @@
+#include "lambdajet/trajectory/v1/trajectory.grpc.pb.h"
+#include "platform/bus/participant.hpp"
+#include "platform/house/house.hpp"
+#include "platform/rpc/rpc_server.hpp"
+#include "platform/telemetry/metrics.hpp"
+#include "trajectory/bus/machine_reader.hpp"
+#include "trajectory/bus/plan_streamer.hpp"
+#include "trajectory/rpc/trajectory_rpc.hpp"
+
+int main(int argc, char** argv) {
+  using namespace lambdajet;
+  House house("trajectory", "reads part programs, plans them and streams them to the modules");
+  if (const auto exit_code = house.Open(argc, argv)) {
+    return *exit_code;
+  }
+  house.Require("machine_description");
+  auto machines = trajectory::MachineReader::Open(house.bus(), house.log(),
+                                                  [&house] { house.Met("machine_description"); });
+  if (!machines.ok()) {
+    return house.Refuse(machines.status());
+  }
+  auto streamer = trajectory::PlanStreamer::Open(house.bus(), house.clock(), house.metrics());
+  if (!streamer.ok()) {
+    return house.Refuse(streamer.status());
+  }
+  trajectory::PlanDesk desk(house.metrics());
+  trajectory::TrajectoryRpc rpc(
+      [&machines](std::optional<std::uint32_t> v) {
+        return v ? (*machines)->Version(*v) : (*machines)->active();
+      },
+      {[&streamer](std::shared_ptr<const Plan> plan) { (*streamer)->Start(std::move(plan)); },
+       [&streamer](std::uint64_t id) { return (*streamer)->Stop(id); }},
+      desk);
+  house.rpc().Add(rpc, trajectory::v1::TrajectoryService::service_full_name());
+  house.OnStop([&desk] { desk.CancelAll(); });
+  return house.Run();
+}

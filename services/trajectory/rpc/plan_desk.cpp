@@ -1,0 +1,131 @@
+#include "trajectory/rpc/plan_desk.hpp"
+
+#include <algorithm>
+#include <chrono>
+
+#include "accuracy/core/prediction.hpp"
+
+namespace lambdajet::trajectory {
+namespace {
+
+constexpr std::size_t kThreads = 1;
+constexpr std::size_t kMostWaiting = 16;
+constexpr int kDraws = 200;
+
+// Without an answer where nothing is cut.
+double PredictedBound(const MachineDescription& machine, const PlannedProgram& planned,
+                      const std::atomic<bool>& cancel) {
+  accuracy::PredictionOptions options;
+  options.draws = kDraws;
+  options.cancelled = [&cancel] { return cancel.load(); };
+  const auto prediction = accuracy::Predict(machine, planned.samples, planned.plan.compensated, options);
+  return prediction.reason == accuracy::PredictionReason::kPredicted ? prediction.predicted_95_mm : 0.0;
+}
+
+}  // namespace
+
+PlanDesk::PlanDesk(Metrics& metrics)
+    : plans_done_(metrics.AddCounter("lambdajet_plans_total", "Plans made.", {{"outcome", "done"}})),
+      plans_failed_(metrics.AddCounter("lambdajet_plans_total", "Plans made.", {{"outcome", "refused"}})),
+      planning_time_(metrics.AddHistogram("lambdajet_planning_seconds", "Time to plan a program.",
+                                          {0.01, 0.03, 0.1, 0.3, 1, 3, 10, 30, 100})),
+      pool_(kThreads, kMostWaiting) {}
+
+absl::StatusOr<std::shared_ptr<const PlanRecord>> PlanDesk::Begin(
+    std::string program, const PlanOptions& options, std::shared_ptr<const MachineDescription> machine) {
+  const std::uint64_t id = PlanIdOf(program, options, *machine);
+  const std::lock_guard lock(mutex_);
+  const auto there =
+      std::find_if(records_.begin(), records_.end(), [id](const auto& r) { return r->id == id; });
+  if (there != records_.end() && (*there)->state != PlanState::kCancelled && !(*there)->cancel) {
+    return std::shared_ptr<const PlanRecord>(*there);
+  }
+  auto record = std::make_shared<PlanRecord>();
+  record->id = id;
+  record->number = ++numbers_;
+  record->machine = std::move(machine);
+  record->options = options;
+  record->program = std::move(program);
+  if (const absl::Status queued = pool_.Submit([this, record] { Work(record); }); !queued.ok()) {
+    return queued;
+  }
+  if (there != records_.end()) {
+    records_.erase(there);
+  }
+  records_.push_back(record);
+  GiveUpOldest();
+  return std::shared_ptr<const PlanRecord>(record);
+}
+
+void PlanDesk::Work(const std::shared_ptr<PlanRecord>& record) {
+  const auto begin = std::chrono::steady_clock::now();
+  auto planned = std::make_shared<PlannedProgram>();
+  if (!record->cancel) {
+    *planned =
+        PlanPartProgram(record->program, *record->machine, record->options, [&record](double progress) {
+          record->progress = 0.9 * progress;
+          return !record->cancel;
+        });
+  }
+  if (planned->faults.empty() && !record->cancel) {
+    record->predicted_95_mm = PredictedBound(*record->machine, *planned, record->cancel);
+  }
+  record->program.clear();
+  record->program.shrink_to_fit();
+  const bool done = planned->faults.empty();
+  record->planned = std::move(planned);
+  record->progress = 1.0;
+  record->state = record->cancel ? PlanState::kCancelled : done ? PlanState::kDone : PlanState::kFailed;
+  (done ? plans_done_ : plans_failed_).Increment();
+  planning_time_.Observe(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
+}
+
+// Called with the mutex held.
+void PlanDesk::GiveUpOldest() {
+  while (records_.size() > kMostPlans) {
+    const auto oldest = std::find_if(records_.begin(), records_.end(), [this](const auto& r) {
+      return r->state != PlanState::kRunning && r->id != kept_;
+    });
+    if (oldest == records_.end()) {
+      return;
+    }
+    records_.erase(oldest);
+  }
+}
+
+std::shared_ptr<const PlanRecord> PlanDesk::Find(std::uint64_t id) const {
+  const std::lock_guard lock(mutex_);
+  const auto there =
+      std::find_if(records_.begin(), records_.end(), [id](const auto& r) { return r->id == id; });
+  return there == records_.end() ? nullptr : *there;
+}
+
+std::shared_ptr<const PlanRecord> PlanDesk::Cancel(std::uint64_t id) {
+  const std::lock_guard lock(mutex_);
+  for (const auto& record : records_) {
+    if (record->id == id) {
+      record->cancel = record->state == PlanState::kRunning;
+      return record;
+    }
+  }
+  return nullptr;
+}
+
+std::vector<std::shared_ptr<const PlanRecord>> PlanDesk::List() const {
+  const std::lock_guard lock(mutex_);
+  return {records_.rbegin(), records_.rend()};
+}
+
+void PlanDesk::KeepFor(std::uint64_t id) {
+  const std::lock_guard lock(mutex_);
+  kept_ = id;
+}
+
+void PlanDesk::CancelAll() {
+  const std::lock_guard lock(mutex_);
+  for (const auto& record : records_) {
+    record->cancel = true;
+  }
+}
+
+}  // namespace lambdajet::trajectory

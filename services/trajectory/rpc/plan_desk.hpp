@@ -1,0 +1,67 @@
+// Keeps plans as resources: begun, watched, cancelled, found again by id.
+//
+// Model: one plan an id; the same request under the same machine finds the plan that is there. Planning runs on threads of
+// its own; finished plans stay until kMostPlans others are newer (one that is being streamed is not given up).
+// Units: s, mm. Threads: any. Errors: RESOURCE_EXHAUSTED OVERLOADED when too many plans wait.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "foundation/machine/machine_description.hpp"
+#include "platform/rpc/work_pool.hpp"
+#include "platform/telemetry/metrics.hpp"
+#include "trajectory/core/feed/plan_program.hpp"
+
+namespace lambdajet::trajectory {
+
+enum class PlanState : std::uint8_t { kRunning, kDone, kFailed, kCancelled };
+
+// One plan. The result is set once, before the state leaves kRunning.
+struct PlanRecord {
+  std::uint64_t id = 0;
+  std::uint64_t number = 0;  // counts up; newest is highest
+  std::shared_ptr<const MachineDescription> machine;
+  PlanOptions options;
+  std::string program;  // given up when planning ends
+  std::atomic<PlanState> state = PlanState::kRunning;
+  std::atomic<double> progress = 0.0;
+  std::atomic<bool> cancel = false;
+  std::shared_ptr<const PlannedProgram> planned;
+  double predicted_95_mm = 0.0;
+};
+
+class PlanDesk {
+ public:
+  static constexpr std::size_t kMostPlans = 12;
+
+  explicit PlanDesk(Metrics& metrics);
+
+  absl::StatusOr<std::shared_ptr<const PlanRecord>> Begin(std::string program, const PlanOptions& options,
+                                                          std::shared_ptr<const MachineDescription> machine);
+  std::shared_ptr<const PlanRecord> Find(std::uint64_t id) const;  // null: not known
+  std::shared_ptr<const PlanRecord> Cancel(std::uint64_t id);
+  std::vector<std::shared_ptr<const PlanRecord>> List() const;  // newest first
+  void KeepFor(std::uint64_t id);                               // this one is being streamed; 0 none
+  void CancelAll();
+
+ private:
+  void Work(const std::shared_ptr<PlanRecord>& record);
+  void GiveUpOldest();
+
+  mutable std::mutex mutex_;
+  std::vector<std::shared_ptr<PlanRecord>> records_;
+  std::uint64_t numbers_ = 0;
+  std::uint64_t kept_ = 0;
+  Counter plans_done_, plans_failed_;
+  Histogram planning_time_;
+  WorkPool pool_;  // last: its threads end first
+};
+
+}  // namespace lambdajet::trajectory

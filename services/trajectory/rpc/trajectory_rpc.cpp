@@ -1,0 +1,272 @@
+#include "trajectory/rpc/trajectory_rpc.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "foundation/contract/trouble.hpp"
+#include "platform/rpc/argument_checks.hpp"
+#include "platform/rpc/handlers.hpp"
+#include "platform/rpc/streams.hpp"
+#include "trajectory/core/part_program/gcode_reader.hpp"
+#include "trajectory/rpc/wire.hpp"
+
+namespace lambdajet::trajectory {
+namespace {
+
+constexpr std::size_t kThreads = 2;
+constexpr std::size_t kMostWaiting = 16;
+constexpr std::size_t kMostListedOperations = 200000;
+constexpr int kPointsPerBatch = 2000;
+constexpr double kDefaultStep_s = 0.004;
+constexpr int kDefaultPage = 20;
+
+absl::Status UnknownPlan(std::uint64_t id) {
+  return Trouble(
+      absl::StatusCode::kNotFound, "UNKNOWN_PLAN",
+      "plan " + std::to_string(id) + " is not known here; plan the program again, the id will be the same");
+}
+
+// Pages count from the newest; the token is the number of the last record shown.
+std::uint64_t FromToken(const std::string& token) {
+  return token.empty() ? UINT64_MAX : std::strtoull(token.c_str(), nullptr, 10);
+}
+
+}  // namespace
+
+TrajectoryRpc::TrajectoryRpc(FindMachine find_machine, Streaming streaming, PlanDesk& desk)
+    : find_machine_(std::move(find_machine)),
+      streaming_(std::move(streaming)),
+      desk_(desk),
+      pool_(kThreads, kMostWaiting) {}
+
+absl::StatusOr<std::shared_ptr<const MachineDescription>> TrajectoryRpc::MachineFor(
+    const v1::PlanOptions& options) const {
+  const auto active = find_machine_(std::nullopt);
+  if (active == nullptr) {
+    return Trouble(absl::StatusCode::kFailedPrecondition, "NO_MACHINE_DESCRIPTION",
+                   "no machine description has come from calibration yet; activate a version first");
+  }
+  if (!options.has_machine_version() || options.machine_version() == active->version) {
+    return active;
+  }
+  const auto older = find_machine_(options.machine_version());
+  if (older == nullptr) {
+    return Trouble(absl::StatusCode::kFailedPrecondition, "MACHINE_VERSION_NOT_HELD",
+                   "version " + std::to_string(options.machine_version()) +
+                       " is not held here; active is version " + std::to_string(active->version),
+                   {{"active_version", std::to_string(active->version)}});
+  }
+  return older;
+}
+
+absl::StatusOr<std::shared_ptr<const PlanRecord>> TrajectoryRpc::DonePlan(std::uint64_t id) const {
+  const auto record = desk_.Find(id);
+  if (record == nullptr) {
+    return UnknownPlan(id);
+  }
+  if (record->state != PlanState::kDone) {
+    return Trouble(absl::StatusCode::kFailedPrecondition, "PLAN_NOT_DONE",
+                   "plan " + std::to_string(id) + " is not done; see GetPlan");
+  }
+  return record;
+}
+
+absl::Status TrajectoryRpc::Admit(const v1::AdmitProgramRequest& request,
+                                  v1::AdmitProgramResponse& response) const {
+  if (const absl::Status status = CheckProgram(request.program()); !status.ok()) {
+    return status;
+  }
+  const auto options = FromWire(request.options());
+  const auto machine = MachineFor(request.options());
+  if (!options.ok() || !machine.ok()) {
+    return options.ok() ? machine.status() : options.status();
+  }
+  const Admission admission = AdmitPartProgram(request.program(), **machine, *options);
+  response.set_admitted(admission.faults.empty());
+  for (const ProgramFault& fault : admission.faults) {
+    ToWire(fault, *response.add_faults());
+  }
+  ToWire(**machine, *response.mutable_model_version());
+  response.set_cutting_length_mm(admission.cutting_length_mm);
+  response.set_idle_length_mm(admission.idle_length_mm);
+  response.set_pierces(admission.pierce_count);
+  return absl::OkStatus();
+}
+
+grpc::ServerUnaryReactor* TrajectoryRpc::AdmitProgram(grpc::CallbackServerContext* context,
+                                                      const v1::AdmitProgramRequest* request,
+                                                      v1::AdmitProgramResponse* response) {
+  return AnswerOn(pool_, context,
+                  [this, request, response](const Cancelled&) { return Admit(*request, *response); });
+}
+
+absl::Status TrajectoryRpc::BeginPlan(const v1::PlanProgramRequest& request,
+                                      v1::PlanProgramResponse& response) {
+  if (const absl::Status status = CheckProgram(request.program()); !status.ok()) {
+    return status;
+  }
+  const auto options = FromWire(request.options());
+  const auto machine = MachineFor(request.options());
+  if (!options.ok() || !machine.ok()) {
+    return options.ok() ? machine.status() : options.status();
+  }
+  const auto record = desk_.Begin(request.program(), *options, *machine);
+  if (!record.ok()) {
+    return record.status();
+  }
+  response.set_plan_id((*record)->id);
+  ToWire(**record, *response.mutable_operation());
+  return absl::OkStatus();
+}
+
+grpc::ServerUnaryReactor* TrajectoryRpc::PlanProgram(grpc::CallbackServerContext* context,
+                                                     const v1::PlanProgramRequest* request,
+                                                     v1::PlanProgramResponse* response) {
+  return Answer(context, [&] { return BeginPlan(*request, *response); });
+}
+
+grpc::ServerUnaryReactor* TrajectoryRpc::GetPlan(grpc::CallbackServerContext* context,
+                                                 const v1::GetPlanRequest* request,
+                                                 v1::GetPlanResponse* response) {
+  return Answer(context, [&]() -> absl::Status {
+    const auto record = desk_.Find(request->plan_id());
+    if (record == nullptr) {
+      return UnknownPlan(request->plan_id());
+    }
+    ToWire(*record, *response->mutable_operation());
+    const PlanState state = record->state;
+    if (state == PlanState::kDone) {
+      ToWire(*record, *response->mutable_summary());
+    } else if (state == PlanState::kFailed) {
+      for (const ProgramFault& fault : record->planned->faults) {
+        ToWire(fault, *response->add_faults());
+      }
+    }
+    return absl::OkStatus();
+  });
+}
+
+grpc::ServerUnaryReactor* TrajectoryRpc::CancelPlan(grpc::CallbackServerContext* context,
+                                                    const v1::CancelPlanRequest* request,
+                                                    v1::CancelPlanResponse* response) {
+  return Answer(context, [&]() -> absl::Status {
+    const auto record = desk_.Cancel(request->plan_id());
+    if (record == nullptr) {
+      return UnknownPlan(request->plan_id());
+    }
+    ToWire(*record, *response->mutable_operation());
+    return absl::OkStatus();
+  });
+}
+
+grpc::ServerUnaryReactor* TrajectoryRpc::ListPlans(grpc::CallbackServerContext* context,
+                                                   const v1::ListPlansRequest* request,
+                                                   v1::ListPlansResponse* response) {
+  return Answer(context, [&]() -> absl::Status {
+    ArgumentChecks checks;
+    checks.InRange("page_size", request->page_size(), 0, 100);
+    checks.Require(request->page_token().find_first_not_of("0123456789") == std::string::npos, "page_token",
+                   "BAD_TOKEN", "must come from an earlier answer");
+    if (!checks.ok()) {
+      return checks.status();
+    }
+    const int page = request->page_size() == 0 ? kDefaultPage : request->page_size();
+    const std::uint64_t before = FromToken(request->page_token());
+    std::uint64_t last = 0;
+    for (const auto& record : desk_.List()) {
+      if (record->number >= before || record->state != PlanState::kDone) {
+        continue;
+      }
+      if (response->plans_size() == page) {
+        response->set_next_page_token(std::to_string(last));
+        break;
+      }
+      ToWire(*record, *response->add_plans());
+      last = record->number;
+    }
+    return absl::OkStatus();
+  });
+}
+
+grpc::ServerWriteReactor<v1::SampleBatch>* TrajectoryRpc::StreamSamples(
+    grpc::CallbackServerContext*, const v1::StreamSamplesRequest* request) {
+  ArgumentChecks checks;
+  const double step_s = request->has_step_s() ? request->step_s() : kDefaultStep_s;
+  checks.InRange("step_s", step_s, 0.0005, 1.0, "s");
+  if (!checks.ok()) {
+    return RefuseStream<v1::SampleBatch>(checks.status());
+  }
+  const auto found = DonePlan(request->plan_id());
+  if (!found.ok()) {
+    return RefuseStream<v1::SampleBatch>(found.status());
+  }
+  const std::shared_ptr<const PlannedProgram> planned = (*found)->planned;
+  const auto count = static_cast<std::int64_t>(std::floor(planned->plan.duration_s / step_s + 1e-9)) + 1;
+  return NewPullStream<v1::SampleBatch>([planned, step_s, count, next = std::int64_t{0}](
+                                            v1::SampleBatch& batch) mutable -> absl::StatusOr<bool> {
+    if (next >= count) {
+      return false;
+    }
+    for (int i = 0; i < kPointsPerBatch && next < count; ++i, ++next) {
+      AddPoint(*planned, static_cast<double>(next) * step_s, batch);
+    }
+    return true;
+  });
+}
+
+grpc::ServerUnaryReactor* TrajectoryRpc::ListOperations(grpc::CallbackServerContext* context,
+                                                        const v1::ListOperationsRequest* request,
+                                                        v1::ListOperationsResponse* response) {
+  return AnswerOn(pool_, context, [request, response](const Cancelled&) -> absl::Status {
+    if (const absl::Status status = CheckProgram(request->program()); !status.ok()) {
+      return status;
+    }
+    const PartProgram program = ReadGcode(request->program());
+    for (const ProgramFault& fault : program.faults) {
+      ToWire(fault, *response->add_faults());
+    }
+    if (!program.faults.empty()) {
+      return absl::OkStatus();
+    }
+    if (program.operations.size() > kMostListedOperations) {
+      return Trouble(absl::StatusCode::kOutOfRange, "TOO_MANY",
+                     std::to_string(program.operations.size()) +
+                         " operations; at most 200000 are listed over the wire, use "
+                         "`lambdajet trajectory canon` on the file");
+    }
+    for (const Operation& operation : program.operations) {
+      response->add_operations(FormatOperation(operation));
+    }
+    return absl::OkStatus();
+  });
+}
+
+grpc::ServerUnaryReactor* TrajectoryRpc::StartStreaming(grpc::CallbackServerContext* context,
+                                                        const v1::StartStreamingRequest* request,
+                                                        v1::StartStreamingResponse* response) {
+  return Answer(context, [&]() -> absl::Status {
+    const auto record = DonePlan(request->plan_id());
+    if (!record.ok()) {
+      return record.status();
+    }
+    desk_.KeepFor((*record)->id);
+    streaming_.start(std::shared_ptr<const Plan>((*record)->planned, &(*record)->planned->plan));
+    ToWire(**record, *response->mutable_summary());
+    return absl::OkStatus();
+  });
+}
+
+grpc::ServerUnaryReactor* TrajectoryRpc::StopStreaming(grpc::CallbackServerContext* context,
+                                                       const v1::StopStreamingRequest* request,
+                                                       v1::StopStreamingResponse* response) {
+  return Answer(context, [&]() -> absl::Status {
+    const std::uint64_t was = streaming_.stop(request->plan_id());
+    if (was != 0) {
+      desk_.KeepFor(0);
+    }
+    response->set_plan_id(was);
+    return absl::OkStatus();
+  });
+}
+
+}  // namespace lambdajet::trajectory

@@ -1,0 +1,132 @@
+#include "trajectory/rpc/wire.hpp"
+
+#include "platform/rpc/argument_checks.hpp"
+#include "trajectory/core/feed/plan_samples.hpp"
+
+namespace lambdajet::trajectory {
+namespace {
+
+std::string Word(std::string_view text) { return std::string(text); }
+
+type::v1::OperationState StateToWire(PlanState state) {
+  switch (state) {
+    case PlanState::kRunning:
+      return type::v1::OPERATION_STATE_RUNNING;
+    case PlanState::kDone:
+      return type::v1::OPERATION_STATE_DONE;
+    case PlanState::kFailed:
+      return type::v1::OPERATION_STATE_FAILED;
+    case PlanState::kCancelled:
+      return type::v1::OPERATION_STATE_CANCELLED;
+  }
+  return type::v1::OPERATION_STATE_UNSPECIFIED;
+}
+
+// A program's bytes outside UTF-8 stand in no word, but may in a fault that quotes it.
+std::string Printable(std::string_view text) {
+  std::string printable(text);
+  for (char& c : printable) {
+    c = c >= 0x20 && c < 0x7f ? c : '?';
+  }
+  return printable;
+}
+
+}  // namespace
+
+absl::Status CheckProgram(const std::string& program) {
+  ArgumentChecks checks;
+  checks.NonEmpty("program", program);
+  checks.Text("program", program, kMostProgramBytes);
+  return checks.status();
+}
+
+absl::StatusOr<PlanOptions> FromWire(const v1::PlanOptions& wire) {
+  PlanOptions options;
+  options.compensate = wire.compensate();
+  options.tolerance_mm = wire.has_tolerance_mm() ? wire.tolerance_mm() : options.tolerance_mm;
+  options.feed_scale = wire.has_feed_scale() ? wire.feed_scale() : options.feed_scale;
+  options.overlap_mm = wire.has_overlap_mm() ? wire.overlap_mm() : options.overlap_mm;
+  ArgumentChecks checks;
+  checks.InRange("options.tolerance_mm", options.tolerance_mm, 1e-3, 10.0, "mm");
+  checks.InRange("options.feed_scale", options.feed_scale, 0.01, 1.2);
+  checks.InRange("options.overlap_mm", options.overlap_mm, 0.0, 100.0, "mm");
+  if (wire.has_start_from_s_mm()) {
+    checks.InRange("options.start_from_s_mm", wire.start_from_s_mm(), 0.0, 1e9, "mm");
+    options.start_from_s_mm = wire.start_from_s_mm();
+  }
+  if (!checks.ok()) {
+    return checks.status();
+  }
+  return options;
+}
+
+void ToWire(const MachineDescription& machine, machine::v1::ModelVersion& wire) {
+  wire.set_machine_id(machine.machine_id);
+  wire.set_version(machine.version);
+  wire.set_hash(machine.hash);
+}
+
+void ToWire(const ProgramFault& fault, v1::ProgramFault& wire) {
+  wire.set_line(fault.line);
+  wire.set_column(fault.column);
+  wire.set_reason(Word(fault.reason));
+  wire.set_word(Printable(fault.word));
+  wire.set_message(Printable(fault.message));
+}
+
+void ToWire(const PlanRecord& record, type::v1::Operation& wire) {
+  const PlanState state = record.state;
+  wire.set_id(std::to_string(record.id));
+  wire.set_state(StateToWire(state));
+  wire.set_progress(record.progress);
+  wire.set_phase(state == PlanState::kRunning ? "planning" : "");
+  if (state == PlanState::kCancelled) {
+    wire.set_reason("CANCELLED");
+    wire.set_message("planning was cancelled");
+  } else if (state == PlanState::kFailed && !record.planned->faults.empty()) {
+    const ProgramFault& fault = record.planned->faults.front();
+    wire.set_reason(Word(fault.reason));
+    wire.set_message("line " + std::to_string(fault.line) + ": " + Printable(fault.message));
+  }
+}
+
+void ToWire(const PlanRecord& record, v1::PlanSummary& wire) {
+  const PlannedProgram& p = *record.planned;
+  wire.set_plan_id(record.id);
+  ToWire(*record.machine, *wire.mutable_model_version());
+  wire.set_compensated(p.plan.compensated);
+  wire.set_duration_s(p.plan.duration_s);
+  wire.set_gate_time_s(p.gate_time_s);
+  wire.set_cutting_time_s(p.cutting_time_s);
+  wire.set_length_mm(p.plan.length_mm);
+  wire.set_cutting_length_mm(p.cutting_length_mm);
+  wire.set_segment_count(static_cast<std::uint32_t>(p.plan.segments.size()));
+  wire.set_gate_count(static_cast<std::uint32_t>(p.plan.gates.size()));
+  wire.set_event_count(static_cast<std::uint32_t>(p.plan.events.size()));
+  wire.set_elastic_lag_s2(p.plan.elastic_lag_s2);
+  wire.set_contour_tolerance_used_mm(p.contour_deviation_mm);
+  double total_mm = 0.0;
+  for (const BindingLength& binding : p.binding) {
+    total_mm += binding.length_mm;
+  }
+  for (const BindingLength& binding : p.binding) {
+    v1::BindingLimit& to = *wire.add_binding_limits();
+    to.set_limit(Word(FeedLimitName(binding.limit)));
+    to.set_length_mm(binding.length_mm);
+    to.set_share(total_mm > 0.0 ? binding.length_mm / total_mm : 0.0);
+  }
+  wire.set_predicted_95_mm(record.predicted_95_mm);
+}
+
+void AddPoint(const PlannedProgram& planned, double tau_s, v1::SampleBatch& wire) {
+  const FullSample s = SampleAt(planned, tau_s);
+  for (const double v : {s.jet.tau_s, s.jet.s_mm, s.jet.x_W_mm, s.jet.y_W_mm, s.jet.vx_W_mm_per_s,
+                         s.jet.vy_W_mm_per_s, s.jet.ax_W_mm_per_s2, s.jet.ay_W_mm_per_s2, s.actuator_mm[0],
+                         s.actuator_mm[1], s.actuator_mm_per_s[0], s.actuator_mm_per_s[1]}) {
+    wire.add_values(v);
+  }
+  wire.add_cutting(s.jet.cutting ? 1 : 0);
+  wire.add_source_line(s.jet.source_line);
+}
+
+}  // namespace lambdajet::trajectory
