@@ -100,9 +100,11 @@ std::optional<IdleMove> FromSpeed(const PlanningModel& model, const Vector2d& fr
   return move;
 }
 
-IdleMove TrapezoidOf(double length, double speed, double acceleration) {
+// Cruises for at least `cruise_s`, the smoothing's first average, so that acceleration never turns within it.
+IdleMove TrapezoidOf(double length, double speed, double acceleration, double cruise_s) {
   IdleMove move;
-  move.speed_mm_per_s = std::min(speed, std::sqrt(acceleration * length));
+  const double rise = acceleration * cruise_s;
+  move.speed_mm_per_s = std::min(speed, 0.5 * (std::sqrt(rise * rise + 4.0 * acceleration * length) - rise));
   move.ramp_s = move.speed_mm_per_s / acceleration;
   move.duration_s = move.ramp_s + length / move.speed_mm_per_s;
   move.name = "TRAPEZOID";
@@ -136,7 +138,8 @@ std::optional<IdleMove> FromRest(const PlanningModel& model, const Vector2d& fro
       return std::nullopt;
     }
     if (verdict == Verdict::kGood) {
-      return TrapezoidOf((to - from).norm(), speed, acceleration);
+      return TrapezoidOf((to - from).norm(), speed, acceleration,
+                         model.filter.first_width * model.filter.knot_s);
     }
     speed *= 0.95;
     acceleration *= 0.95 * 0.95;

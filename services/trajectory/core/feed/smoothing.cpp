@@ -52,20 +52,22 @@ void CorrectOutwards(const std::vector<PathSample>& in, double half_variance_sam
 }  // namespace
 
 SmoothingFilter SmoothingFilter::ForLimits(double knot_s, double acceleration_mm_per_s2,
-                                           double jerk_mm_per_s3) {
+                                           double jerk_mm_per_s3, double ramp_s2) {
   SmoothingFilter filter;
   filter.knot_s = knot_s;
   // From nothing to the limit within T1. Where it turns from one sign to the other, the planner finds the jerk too high
   // and slows there.
   const double t1 = acceleration_mm_per_s2 / jerk_mm_per_s3;
   filter.first_width = std::max(1, OddWidth(t1, knot_s));
-  filter.second_width = std::max(1, OddWidth(0.25 * t1, knot_s));
+  const double t2 = std::max(0.25 * t1, std::sqrt(ramp_s2));
+  filter.second_width = std::max(1, OddWidth(t2, knot_s));
+  filter.third_width = ramp_s2 > 0.0 ? std::max(1, OddWidth(ramp_s2 / t2, knot_s)) : 1;
   return filter;
 }
 
 double SmoothingFilter::variance_s2() const {
-  const double n1 = first_width, n2 = second_width;
-  return knot_s * knot_s * ((n1 * n1 - 1.0) / 12.0 + (n2 * n2 - 1.0) / 12.0 + 0.5);
+  const double n1 = first_width, n2 = second_width, n3 = third_width;
+  return knot_s * knot_s * ((n1 * n1 - 1.0) / 12.0 + (n2 * n2 - 1.0) / 12.0 + (n3 * n3 - 1.0) / 12.0 + 0.5);
 }
 
 double SmoothingFilter::overshoot() const {
@@ -98,7 +100,11 @@ std::vector<PathSample> Smooth(const SmoothingFilter& filter, const std::vector<
   CorrectOutwards(samples, 0.5 * filter.variance_s2() / (filter.knot_s * filter.knot_s), a);
   MovingAverage(a, filter.first_width, b);
   MovingAverage(b, filter.second_width, a);
-  return a;
+  if (filter.third_width == 1) {
+    return a;
+  }
+  MovingAverage(a, filter.third_width, b);
+  return b;
 }
 
 KnotState EvaluateKnot(const std::vector<PathSample>& control, std::size_t index, double h) {

@@ -1,6 +1,6 @@
 // Smooths a motion sampled in time so that its jerk is bounded, without leaving the contour.
 //
-// Model: symmetric moving averages of T1 and T2 over samples a knot apart, then a uniform quintic B-spline with the averaged
+// Model: symmetric moving averages of T1, T2 and T3 over samples a knot apart, then a uniform quintic B-spline with the averaged
 // samples as control points: the motion is four times continuously differentiable, and every average keeps what is convex
 // (speed, magnitude of acceleration). An average pulls an arc inwards by sigma^2/2 of its normal acceleration, sigma^2 the
 // kernel's variance; that much is added outwards first (only along the normal, so that path length stays monotone).
@@ -20,12 +20,16 @@ struct SmoothingFilter {
   double knot_s = 0.002;
   int first_width = 1;  // samples, odd
   int second_width = 1;
+  int third_width = 1;
 
-  static SmoothingFilter ForLimits(double knot_s, double acceleration_mm_per_s2, double jerk_mm_per_s3);
+  // Wide enough for the path's jerk limit; with `ramp_s2` above 0 so that T2 T3 is at least that: a jump of jerk then becomes
+  // a fifth derivative of at most the jump over ramp_s2.
+  static SmoothingFilter ForLimits(double knot_s, double acceleration_mm_per_s2, double jerk_mm_per_s3,
+                                   double ramp_s2);
 
   double variance_s2() const;
   int reach() const {
-    return first_width / 2 + second_width / 2 + 3;
+    return first_width / 2 + second_width / 2 + third_width / 2 + 3;
   }  // samples either side that a value depends on
   double half_support_s() const { return (reach() + 0.5) * knot_s; }
   // Peak of the answer to a unit step in normal acceleration; above 1 because of the outward correction.

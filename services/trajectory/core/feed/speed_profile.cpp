@@ -126,7 +126,8 @@ std::string_view FeedLimitName(FeedLimit limit) {
                                                                            "ACTUATOR_2_ACCELERATION",
                                                                            "CONTOUR_TOLERANCE",
                                                                            "PREDICTED_ERROR",
-                                                                           "ACTUATOR_JERK"};
+                                                                           "ACTUATOR_JERK",
+                                                                           "PATH_JERK"};
   return kNames[static_cast<std::size_t>(limit)];
 }
 

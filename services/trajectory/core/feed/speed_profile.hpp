@@ -25,9 +25,10 @@ enum class FeedLimit : std::uint8_t {
   kActuator2Acceleration,
   kContourTolerance,
   kPredictedError,
-  kActuatorJerk
+  kActuatorJerk,
+  kPathJerk
 };
-inline constexpr std::size_t kFeedLimitCount = 11;
+inline constexpr std::size_t kFeedLimitCount = 12;
 
 // UPPER_SNAKE.
 std::string_view FeedLimitName(FeedLimit limit);

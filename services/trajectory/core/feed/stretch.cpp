@@ -130,12 +130,22 @@ class StretchPlanner {
       e.begin_time_s = time;
       time += elements_[i].kind == ElementKind::kRun ? e.run.node_time.back() : e.idle.duration_s;
       e.end_time_s = time;
-      if (elements_[i].flush_after) {
-        time += (2 * model_.filter.reach() + 2) * knot_;
-      }
+      time += PauseAfter(i);
     }
     input_duration_ = time;
   }
+
+  // An exact stop lets the smoothing run out. Between moves that meet at standstill the first average lies between stopping
+  // and starting, so that their accelerations do not add up to a jerk of twice the limit.
+  double PauseAfter(std::size_t i) const {
+    if (elements_[i].flush_after) {
+      return (2 * model_.filter.reach() + 2) * knot_;
+    }
+    const bool run = elements_[i].kind == ElementKind::kRun;
+    return i + 1 < elements_.size() && (!run || planned_[i].run.end_speed_mm_per_s == 0.0) ? FirstAverage()
+                                                                                           : 0.0;
+  }
+  double FirstAverage() const { return model_.filter.first_width * knot_; }
 
   void SolveProfile(PlannedRun& run, double end_speed) {
     run.solved = run.nodes;
@@ -197,8 +207,8 @@ class StretchPlanner {
       if (!move) {
         continue;
       }
-      const double cost =
-          move->duration_s + (fastest > 0.0 ? (fastest - v) * (fastest - v) / (2.0 * a * fastest) : 0.0);
+      const double cost = move->duration_s + (v > 0.0 ? 0.0 : FirstAverage()) +
+                          (fastest > 0.0 ? (fastest - v) * (fastest - v) / (2.0 * a * fastest) : 0.0);
       if (cost < best) {
         best = cost;
         best_speed = v;
@@ -563,7 +573,7 @@ class StretchPlanner {
   void KnotExcess(const KnotState& k, Excess& excess) {
     const PathLimits& path = model_.machine.path;
     Judge(k.second.head<2>().norm() / path.acceleration_mm_per_s2, 0.5, FeedLimit::kPathAcceleration, excess);
-    Judge(k.third.head<2>().norm() / path.jerk_mm_per_s3, 1.0 / 3.0, FeedLimit::kPathAcceleration, excess);
+    Judge(k.third.head<2>().norm() / path.jerk_mm_per_s3, 1.0 / 3.0, FeedLimit::kPathJerk, excess);
     double tolerance;
     const double deviation = Deviation(k, tolerance);
     if (deviation >= 0.0) {
@@ -800,11 +810,24 @@ class StretchPlanner {
 
 }  // namespace
 
+namespace {
+
+// The lead's third derivative is m/k times the path's fifth: this much of T2 T3 keeps it to a share of the actuators' jerk.
+double LeadRamp(const MachineDescription& m) {
+  constexpr double kShareOfJerk = 0.5;
+  constexpr double kJumpAndLever = 3.0;  // jerk turning from one sign to the other, and the mechanism's lever
+  const double jerk = std::min(m.actuators[0].jerk_mm_per_s3, m.actuators[1].jerk_mm_per_s3);
+  return kJumpAndLever * m.value(Parameter::kElasticLagS2) * m.path.jerk_mm_per_s3 / (kShareOfJerk * jerk);
+}
+
+}  // namespace
+
 PlanningModel::PlanningModel(const MachineDescription& m, const PlanOptions& o)
     : machine(m),
       options(o),
       sheet(m),
-      filter(SmoothingFilter::ForLimits(o.knot_s, m.path.acceleration_mm_per_s2, m.path.jerk_mm_per_s3)),
+      filter(SmoothingFilter::ForLimits(o.knot_s, m.path.acceleration_mm_per_s2, m.path.jerk_mm_per_s3,
+                                        o.compensate ? LeadRamp(m) : 0.0)),
       overshoot(filter.overshoot()),
       path_acceleration_mm_per_s2(kPathMargin * m.path.acceleration_mm_per_s2) {
   for (std::size_t j = 0; j < 2; ++j) {
