@@ -133,6 +133,16 @@ struct TwistRate {
   Eigen::Vector3d alpha_rad_per_s2 = Eigen::Vector3d::Zero();
 };
 
+// What another point of the same body does, `lever` away and written in A; the body turns as before.
+inline Twist AtLever(const Twist& twist, const Eigen::Vector3d& lever_mm) {
+  return {twist.v_mm_per_s + twist.w_rad_per_s.cross(lever_mm), twist.w_rad_per_s};
+}
+inline TwistRate AtLever(const Twist& twist, const TwistRate& rate, const Eigen::Vector3d& lever_mm) {
+  return {rate.a_mm_per_s2 + rate.alpha_rad_per_s2.cross(lever_mm) +
+              twist.w_rad_per_s.cross(twist.w_rad_per_s.cross(lever_mm)),
+          rate.alpha_rad_per_s2};
+}
+
 // Turns a pose by a rotation vector written in A, about B's origin, and shifts it.
 inline Pose Displaced(const Pose& X_AB, const Eigen::Vector3d& shift_mm, const Eigen::Vector3d& turn_rad) {
   const double angle = turn_rad.norm();

@@ -13,6 +13,8 @@ int CountOf(double from, double to, double step) {
   return std::max(1, static_cast<int>(std::ceil((to - from) / step)));
 }
 
+bool Cancelled(const HexapodWorkspaceRequest& request) { return request.cancelled && request.cancelled(); }
+
 // One row of a slice: asks along x.
 class Row {
  public:
@@ -122,7 +124,7 @@ HexapodSlice CutSlice(const Hexapod& hexapod, const HexapodWorkspaceRequest& req
   slice.z_mm = z_mm;
   const int rows = CountOf(request.box.y_min_mm, request.box.y_max_mm, request.step_mm);
   const double step = (request.box.y_max_mm - request.box.y_min_mm) / rows;
-  for (int i = 0; i <= rows; ++i) {
+  for (int i = 0; i <= rows && !Cancelled(request); ++i) {
     const double length = ScanRow(hexapod, request, request.box.y_min_mm + i * step, z_mm, slice.spans);
     slice.area_mm2 += (i == 0 || i == rows ? 0.5 : 1.0) * step * length;
   }
@@ -142,7 +144,7 @@ HexapodVoxels FillVoxels(const Hexapod& hexapod, const HexapodWorkspaceRequest& 
                         static_cast<std::size_t>(voxels.count_z));
   long served = 0;
   for (int iz = 0; iz < voxels.count_z; ++iz) {
-    for (int iy = 0; iy < voxels.count_y; ++iy) {
+    for (int iy = 0; iy < voxels.count_y && !Cancelled(request); ++iy) {
       for (int ix = 0; ix < voxels.count_x; ++ix) {
         const Eigen::Vector3d centre = Eigen::Vector3d(box.x_min_mm, box.y_min_mm, box.z_min_mm) +
                                        request.step_mm * Eigen::Vector3d(ix + 0.5, iy + 0.5, iz + 0.5);

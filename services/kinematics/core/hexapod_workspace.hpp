@@ -10,6 +10,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <functional>
 #include <string_view>
 #include <vector>
 
@@ -29,6 +30,7 @@ struct HexapodWorkspaceRequest {
   double step_mm = 10.0;
   double tolerance_mm = 0.05;
   std::vector<Eigen::Matrix3d> R_MT = {Eigen::Matrix3d::Identity()};
+  std::function<bool()> cancelled;  // asked once a row; the answer then ends there
 };
 inline constexpr double kMostWorkspaceSamples = 5e7;
 std::string_view FaultOf(const HexapodWorkspaceRequest& request);

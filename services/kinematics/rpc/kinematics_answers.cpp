@@ -174,6 +174,9 @@ absl::Status KinematicsAnswers::SolveInverse(const v1::SolveInverseRequest& requ
     if (checks.ok()) {
       SolveToWire(*selected->hexapod, X_MT, response);
     }
+    if (request.has_motion() && checks.ok()) {
+      MotionToWire(*selected->hexapod, X_MT, request, checks, response);
+    }
     return checks.status();
   }
   const Eigen::Vector2d p_DE_mm = FromWire(request.p_de(), "p_DE", "mm", checks);
@@ -207,6 +210,9 @@ absl::Status KinematicsAnswers::SolveForward(const v1::SolveForwardRequest& requ
                                                 : ToolFromPlatform(hexapod, hexapod.geometry().X_MP_home);
     if (checks.ok()) {
       SolveToWire(hexapod, Eigen::Map<const StrutVector>(readings.data()), start, response);
+    }
+    if (!request.actuator_velocity_mm_per_s().empty() && checks.ok()) {
+      MotionToWire(hexapod, request, checks, response);
     }
     return checks.status();
   }

@@ -1,6 +1,7 @@
 #include "kinematics/rpc/kinematics_service.hpp"
 
 #include "kinematics/rpc/batch_stream.hpp"
+#include "kinematics/rpc/wire_hexapod_workspace.hpp"
 #include "kinematics/rpc/wire_workspace.hpp"
 #include "platform/rpc/handlers.hpp"
 
@@ -64,6 +65,13 @@ Rpc::Unary* Rpc::ComputeWorkspace(Context* context, const v1::ComputeWorkspaceRe
                                   v1::ComputeWorkspaceResponse* response) {
   return AnswerOn(long_work_, context, [this, request, response](const Cancelled& cancelled) {
     return kinematics::ComputeWorkspace(slot_, *request, cancelled, *response);
+  });
+}
+
+Rpc::Unary* Rpc::ComputeHexapodWorkspace(Context* context, const v1::ComputeHexapodWorkspaceRequest* request,
+                                         v1::ComputeHexapodWorkspaceResponse* response) {
+  return AnswerOn(long_work_, context, [this, request, response](const Cancelled& cancelled) {
+    return kinematics::ComputeHexapodWorkspace(slot_, *request, cancelled, *response);
   });
 }
 

@@ -38,6 +38,8 @@ class KinematicsRpc final : public v1::KinematicsService::CallbackService {
                            v1::ReportSingularityResponse* response) override;
   Unary* ComputeWorkspace(Context* context, const v1::ComputeWorkspaceRequest* request,
                           v1::ComputeWorkspaceResponse* response) override;
+  Unary* ComputeHexapodWorkspace(Context* context, const v1::ComputeHexapodWorkspaceRequest* request,
+                                 v1::ComputeHexapodWorkspaceResponse* response) override;
   Unary* ComputeServiceArea(Context* context, const v1::ComputeServiceAreaRequest* request,
                             v1::ComputeServiceAreaResponse* response) override;
   Unary* OptimiseGeometry(Context* context, const v1::OptimiseGeometryRequest* request,

@@ -130,12 +130,77 @@ void LimitsFromWire(const v1::HexapodGeometry& wire, HexapodLimits& limits, Argu
   limits.singular_margin = wire.singular_margin();
 }
 
-void RefusalToWire(Reason reason, double excess, int strut, v1::Refusal& wire) {
+using Six = Eigen::Matrix<double, 6, 1>;
+
+// Six finite numbers, or none where `may_be_absent`.
+Six SixFromWire(const google::protobuf::RepeatedField<double>& wire, const std::string& field,
+                bool may_be_absent, ArgumentChecks& checks) {
+  if (wire.empty() && may_be_absent) {
+    return Six::Zero();
+  }
+  checks.CountInRange(field, static_cast<std::size_t>(wire.size()), 6, 6);
+  for (const double number : wire) {
+    checks.InRange(field, number, -1e9, 1e9);
+  }
+  return wire.size() == 6 ? Six(Eigen::Map<const Six>(wire.data())) : Six(Six::Zero());
+}
+
+void SixToWire(const Eigen::Vector3d& first, const Eigen::Vector3d& second,
+               google::protobuf::RepeatedField<double>& wire) {
+  wire.Add(first.data(), first.data() + 3);
+  wire.Add(second.data(), second.data() + 3);
+}
+
+// From the platform's pole to the tool, written in M.
+Eigen::Vector3d ToolLever(const Hexapod& hexapod, const Pose& X_MP) {
+  return X_MP.R * hexapod.geometry().X_PT.p_mm;
+}
+
+std::string BoundMessage(const HexapodInverse& answer) {
+  switch (answer.bound) {
+    case HexapodBound::kStrutMin:
+      return fmt::format("would be {:.4f} mm shorter than it can be; move the pose away from the base",
+                         answer.excess);
+    case HexapodBound::kStrutMax:
+      return fmt::format("would be {:.4f} mm longer than it can be; move the pose towards the base",
+                         answer.excess);
+    case HexapodBound::kBaseJointCone:
+      return fmt::format("would leave its cone at the base by {:.6f} rad; move the pose towards home",
+                         answer.excess);
+    case HexapodBound::kPlatformJointCone:
+      return fmt::format("would leave its cone at the platform by {:.6f} rad; tilt less", answer.excess);
+    case HexapodBound::kSingularMargin:
+      return fmt::format(
+          "the smallest singular value is {:.6f} mm/mm below the margin; turn the pose towards home",
+          answer.excess);
+    case HexapodBound::kNone:
+      break;
+  }
+  return answer.reason == Reason::kNotConverged
+             ? "its imperfect joint cannot be closed; give smaller deviations"
+             : RefusalMessage(answer.reason, answer.excess);
+}
+
+void RefusalToWire(Reason reason, double excess, int strut, const std::string& message, v1::Refusal& wire) {
   wire.set_reason(ToWire(reason));
-  wire.set_message(strut < 0 ? RefusalMessage(reason, excess)
-                             : fmt::format("strut {}: {}", strut + 1, RefusalMessage(reason, excess)));
+  wire.set_message(strut < 0 ? message : fmt::format("strut {}: {}", strut + 1, message));
   wire.set_excess(excess);
   wire.set_strut(static_cast<std::uint32_t>(strut + 1));
+}
+
+std::string ForwardMessage(const HexapodForward& answer) {
+  switch (answer.reason) {
+    case Reason::kNotConverged:
+      return fmt::format(
+          "no pose found in {} steps, {:.4g} mm are left; start nearer or give lengths that one has",
+          answer.iterations, answer.residual_mm);
+    case Reason::kModeMismatch:
+      return "the pose found is another way to assemble the struts than the start's; start nearer";
+    case Reason::kOutOfReach:
+      return "would be 0 mm long or less; give the encoder's reading and its zero";
+    default:
+      return RefusalMessage(answer.reason, 0.0);
+  }
 }
 
 // The numbers of a service area that a request may set, by name.
@@ -215,7 +280,8 @@ void ToWire(const Pose& pose, v1::SpatialPose& wire) {
 void SolveToWire(const Hexapod& hexapod, const Pose& X_MT, v1::SolveInverseResponse& wire) {
   const HexapodInverse answer = SolveInverseWithMargin(hexapod, PlatformFromTool(hexapod, X_MT));
   if (answer.reason != Reason::kSolved) {
-    return RefusalToWire(answer.reason, answer.excess, answer.strut, *wire.mutable_refusal());
+    return RefusalToWire(answer.reason, answer.excess, answer.strut, BoundMessage(answer),
+                         *wire.mutable_refusal());
   }
   wire.mutable_solution()->mutable_actuator_position_mm()->Add(answer.actuators_mm.data(),
                                                                answer.actuators_mm.data() + kStruts);
@@ -225,7 +291,7 @@ void SolveToWire(const Hexapod& hexapod, const StrutVector& actuators_mm, const 
                  v1::SolveForwardResponse& wire) {
   const HexapodForward answer = SolveForward(hexapod, actuators_mm, PlatformFromTool(hexapod, X_MT_start));
   if (answer.reason != Reason::kSolved) {
-    return RefusalToWire(answer.reason, 0.0, answer.strut, *wire.mutable_refusal());
+    return RefusalToWire(answer.reason, 0.0, answer.strut, ForwardMessage(answer), *wire.mutable_refusal());
   }
   v1::ForwardSolution& solution = *wire.mutable_solution();
   ToWire(ToolFromPlatform(hexapod, answer.X_MP), *solution.mutable_x_mt());
@@ -233,11 +299,58 @@ void SolveToWire(const Hexapod& hexapod, const StrutVector& actuators_mm, const 
   solution.set_residual_mm(answer.residual_mm);
 }
 
+void MotionToWire(const Hexapod& hexapod, const Pose& X_MT, const v1::SolveInverseRequest& request,
+                  ArgumentChecks& checks, v1::SolveInverseResponse& wire) {
+  const Six twist = SixFromWire(request.motion().twist(), "motion.twist", false, checks);
+  const Six rate = SixFromWire(request.motion().twist_rate(), "motion.twist_rate", true, checks);
+  if (!checks.ok() || !wire.has_solution()) {
+    return;
+  }
+  const Pose X_MP = PlatformFromTool(hexapod, X_MT);
+  const Eigen::Vector3d lever = -ToolLever(hexapod, X_MP);
+  const Twist tool{twist.head<3>(), twist.tail<3>()};
+  const ActuatorMotion motion = ActuatorMotionOf(hexapod, X_MP, AtLever(tool, lever),
+                                                 AtLever(tool, {rate.head<3>(), rate.tail<3>()}, lever));
+  if (!motion.velocity_mm_per_s.allFinite() || !motion.acceleration_mm_per_s2.allFinite()) {
+    return;
+  }
+  v1::InverseSolution& solution = *wire.mutable_solution();
+  solution.mutable_actuator_velocity_mm_per_s()->Add(motion.velocity_mm_per_s.data(),
+                                                     motion.velocity_mm_per_s.data() + kStruts);
+  solution.mutable_actuator_acceleration_mm_per_s2()->Add(motion.acceleration_mm_per_s2.data(),
+                                                          motion.acceleration_mm_per_s2.data() + kStruts);
+}
+
+void MotionToWire(const Hexapod& hexapod, const v1::SolveForwardRequest& request, ArgumentChecks& checks,
+                  v1::SolveForwardResponse& wire) {
+  const ActuatorMotion actuators{
+      SixFromWire(request.actuator_velocity_mm_per_s(), "actuator_velocity_mm_per_s", false, checks),
+      SixFromWire(request.actuator_acceleration_mm_per_s2(), "actuator_acceleration_mm_per_s2", true,
+                  checks)};
+  if (!checks.ok() || !wire.has_solution()) {
+    return;
+  }
+  ArgumentChecks own;  // what this service has written itself
+  const Pose X_MP = PlatformFromTool(hexapod, FromWire(wire.solution().x_mt(), "X_MT", own));
+  const PlatformMotion motion = PlatformMotionOf(hexapod, X_MP, actuators);
+  if (motion.reason != Reason::kSolved || !motion.rate.a_mm_per_s2.allFinite() ||
+      !motion.rate.alpha_rad_per_s2.allFinite()) {
+    return;
+  }
+  const Eigen::Vector3d lever = ToolLever(hexapod, X_MP);
+  const Twist tool = AtLever(motion.twist, lever);
+  const TwistRate rate = AtLever(motion.twist, motion.rate, lever);
+  v1::SpatialMotion& out = *wire.mutable_solution()->mutable_motion();
+  SixToWire(tool.v_mm_per_s, tool.w_rad_per_s, *out.mutable_twist());
+  SixToWire(rate.a_mm_per_s2, rate.alpha_rad_per_s2, *out.mutable_twist_rate());
+}
+
 void JacobianToWire(const Hexapod& hexapod, const Pose& X_MT, v1::ComputeJacobianResponse& wire) {
   const Pose X_MP = PlatformFromTool(hexapod, X_MT);
   const PoseJacobian J = ActuatorJacobian(hexapod, X_MP);
   if (!J.allFinite()) {
-    return RefusalToWire(Reason::kSingular, 0.0, -1, *wire.mutable_refusal());
+    return RefusalToWire(Reason::kSingular, 0.0, -1, "a strut has no length in this pose",
+                         *wire.mutable_refusal());
   }
   const HexapodSingularity singularity = AnalyseSingularity(hexapod, X_MP);
   v1::JacobianSolution& solution = *wire.mutable_solution();
@@ -257,7 +370,8 @@ void JacobianToWire(const Hexapod& hexapod, const Pose& X_MT, v1::ComputeJacobia
 void SingularityToWire(const Hexapod& hexapod, const Pose& X_MT, v1::ReportSingularityResponse& wire) {
   const HexapodSingularity answer = AnalyseSingularity(hexapod, PlatformFromTool(hexapod, X_MT));
   if (!std::isfinite(answer.determinant)) {
-    return RefusalToWire(Reason::kSingular, 0.0, -1, *wire.mutable_refusal());
+    return RefusalToWire(Reason::kSingular, 0.0, -1, "a strut has no length in this pose",
+                         *wire.mutable_refusal());
   }
   v1::SingularitySolution& solution = *wire.mutable_solution();
   solution.set_type(answer.signed_margin > hexapod.geometry().limits.singular_margin

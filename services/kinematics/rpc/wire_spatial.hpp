@@ -24,6 +24,11 @@ void ToWire(const Pose& pose, v1::SpatialPose& wire);
 void SolveToWire(const Hexapod& hexapod, const Pose& X_MT, v1::SolveInverseResponse& wire);
 void SolveToWire(const Hexapod& hexapod, const StrutVector& actuators_mm, const Pose& X_MT_start,
                  v1::SolveForwardResponse& wire);
+// Motion beside the solution, if the request asks for it and there is a solution.
+void MotionToWire(const Hexapod& hexapod, const Pose& X_MT, const v1::SolveInverseRequest& request,
+                  ArgumentChecks& checks, v1::SolveInverseResponse& wire);
+void MotionToWire(const Hexapod& hexapod, const v1::SolveForwardRequest& request, ArgumentChecks& checks,
+                  v1::SolveForwardResponse& wire);
 void JacobianToWire(const Hexapod& hexapod, const Pose& X_MT, v1::ComputeJacobianResponse& wire);
 void SingularityToWire(const Hexapod& hexapod, const Pose& X_MT, v1::ReportSingularityResponse& wire);
 

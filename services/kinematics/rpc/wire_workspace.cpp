@@ -18,7 +18,7 @@ absl::Status CheckPlanar(const SelectedMechanism& selected) {
   }
   return Trouble(absl::StatusCode::kInvalidArgument, "WRONG_MECHANISM",
                  "this question is about a lambda or a biglide; a hexapod's region is asked for with "
-                 "ComputeServiceArea");
+                 "ComputeHexapodWorkspace");
 }
 
 absl::Status CheckWanted(const std::function<bool()>& cancelled) {

@@ -1,0 +1,1 @@
+lambdajet_check(wire_kinematics_hexapod LABELS wire SOURCES kinematics_hexapod_test.cpp DEPS kinematics_rpc)
