@@ -1,13 +1,20 @@
 #include "platform/telemetry/metrics.hpp"
 
+#include <arpa/inet.h>
+#include <netinet/in.h>
 #include <prometheus/counter.h>
 #include <prometheus/exposer.h>
 #include <prometheus/gauge.h>
 #include <prometheus/histogram.h>
 #include <prometheus/registry.h>
 #include <prometheus/text_serializer.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
+#include <atomic>
+#include <chrono>
 #include <exception>
+#include <thread>
 
 #include "foundation/contract/trouble.hpp"
 
@@ -62,6 +69,22 @@ void Metrics::AddBuildInfo(const std::string& house, const std::string& version)
 
 std::string Metrics::Text() const { return prometheus::TextSerializer().Serialize(registry_->Collect()); }
 
+namespace {
+
+void Knock(const std::string& host, int port) {
+  const int connection = socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+  sockaddr_in to{};
+  to.sin_family = AF_INET;
+  to.sin_port = htons(static_cast<std::uint16_t>(port));
+  if (inet_pton(AF_INET, host.c_str(), &to.sin_addr) != 1 || to.sin_addr.s_addr == htonl(INADDR_ANY)) {
+    to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  }
+  static_cast<void>(connect(connection, reinterpret_cast<const sockaddr*>(&to), sizeof to));
+  close(connection);
+}
+
+}  // namespace
+
 class MetricsExporter::Server {
  public:
   explicit Server(const std::string& address) : exposer(address, 2) {}
@@ -69,7 +92,23 @@ class MetricsExporter::Server {
 };
 
 MetricsExporter::MetricsExporter() = default;
-MetricsExporter::~MetricsExporter() = default;
+
+// The HTTP server's accepting thread looks at its stop flag only after a connection or two seconds; so connect.
+MetricsExporter::~MetricsExporter() {
+  if (server_ == nullptr) {
+    return;
+  }
+  std::atomic<bool> stopped = false;
+  std::thread stopping([&] {
+    server_.reset();
+    stopped = true;
+  });
+  while (!stopped) {
+    Knock(host_, port_);
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
+  stopping.join();
+}
 
 absl::StatusOr<std::unique_ptr<MetricsExporter>> MetricsExporter::Start(const Metrics& metrics,
                                                                         const std::string& address) {
@@ -77,6 +116,7 @@ absl::StatusOr<std::unique_ptr<MetricsExporter>> MetricsExporter::Start(const Me
   try {
     exporter->server_ = std::make_unique<Server>(address);
     exporter->server_->exposer.RegisterCollectable(metrics.registry());
+    exporter->host_ = address.substr(0, address.rfind(':'));
     exporter->port_ = exporter->server_->exposer.GetListeningPorts().at(0);
   } catch (const std::exception& error) {
     return Trouble(

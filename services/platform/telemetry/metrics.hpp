@@ -97,6 +97,7 @@ class MetricsExporter {
   class Server;
   MetricsExporter();
   std::unique_ptr<Server> server_;
+  std::string host_;
   int port_ = 0;
 };
 

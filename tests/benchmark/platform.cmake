@@ -1,0 +1,3 @@
+add_executable(platform_rpc_overhead platform_rpc_overhead.cpp)
+lambdajet_own_code(platform_rpc_overhead)
+target_link_libraries(platform_rpc_overhead PRIVATE platform_rpc test_echo_proto)
