@@ -101,39 +101,44 @@ std::optional<Hole> HoleAt(const MachineDescription& machine, const Prior& prior
   return hole;
 }
 
-// A row of holes along the sheet's x, from a corner inwards; empty if none of that row is free.
-std::vector<Hole> HolesFrom(const MachineDescription& machine, const Prior& prior,
-                            const Eigen::Vector2d& corner, int count) {
+// Free places for holes in a row along the sheet's x, from a corner inwards.
+std::vector<Hole> HolesFrom(const MachineDescription& machine, const Prior& prior, const Eigen::Vector2d& corner,
+                            int count) {
   const bool right = corner.x() > 0.5 * machine.sheet_width_mm;
   const bool top = corner.y() > 0.5 * machine.sheet_height_mm;
   const double room = 0.25 * machine.sheet_width_mm;  // of the edge: the rest belongs to parts
   std::vector<Hole> holes;
-  for (double along = kEdge_mm; along <= room && static_cast<int>(holes.size()) < count;
-       along += kHolePitch_mm) {
-    const Eigen::Vector2d p_W(corner.x() + (right ? -along : along),
-                              corner.y() + (top ? -kEdge_mm : kEdge_mm));
+  for (double along = kEdge_mm; along <= room && static_cast<int>(holes.size()) < count; along += kHolePitch_mm) {
+    const Eigen::Vector2d p_W(corner.x() + (right ? -along : along), corner.y() + (top ? -kEdge_mm : kEdge_mm));
     if (auto hole = HoleAt(machine, prior, p_W)) {
       holes.push_back(*hole);
     }
   }
-  return static_cast<int>(holes.size()) == count ? holes : std::vector<Hole>{};
+  return holes;
 }
 
+// In turn in every corner, since holes side by side share one error of the rails; empty if there is no room for all.
 std::vector<Hole> TrialHoles(const MachineDescription& machine, const Prior& prior,
                              const MeasuringPlanOptions& options) {
   const double w = machine.sheet_width_mm;
   const double h = machine.sheet_height_mm;
-  std::vector<Eigen::Vector2d> corners = {{w, h}, {0.0, h}, {w, 0.0}, {0.0, 0.0}};
+  std::vector<Eigen::Vector2d> corners = {{w, h}, {w, 0.0}, {0.0, h}, {0.0, 0.0}};
   if (options.scrap_W_mm) {
     corners = {*options.scrap_W_mm};
   }
+  std::vector<std::vector<Hole>> free;
   for (const Eigen::Vector2d& corner : corners) {
-    auto holes = HolesFrom(machine, prior, corner, options.trial_pierces);
-    if (!holes.empty()) {
-      return holes;
+    free.push_back(HolesFrom(machine, prior, corner, options.trial_pierces));
+  }
+  std::vector<Hole> holes;
+  for (std::size_t round = 0; round < static_cast<std::size_t>(options.trial_pierces); ++round) {
+    for (const std::vector<Hole>& of_corner : free) {
+      if (round < of_corner.size() && static_cast<int>(holes.size()) < options.trial_pierces) {
+        holes.push_back(of_corner[round]);
+      }
     }
   }
-  return {};
+  return static_cast<int>(holes.size()) == options.trial_pierces ? holes : std::vector<Hole>{};
 }
 
 // Greedy D-optimal choice; `information` starts with what is known anyway and takes up what is chosen.
@@ -321,10 +326,8 @@ std::string Write(const MachineDescription& machine, const MeasuringPlanOptions&
   if (shaken != nullptr) {
     Shake(machine, *shaken, program);
   }
-  for (const Hole& hole : holes) {
-    program.Pierce(hole.p_W_mm, options.pierce_time_s);
-  }
   for (std::size_t n = 0; n < holes.size(); ++n) {
+    program.Pierce(holes[n].p_W_mm, options.pierce_time_s);
     program.Look(holes[n].look_W_mm, kFirstHole + 1 + static_cast<int>(n));
   }
   program.Line("M2");

@@ -2,8 +2,8 @@
 //
 // Model: looks are chosen one by one from the marks in reach so that each adds most to log det(I + information) of the 19
 // parameters scaled to their priors (Bayesian D-optimal design, greedy: Chaloner and Verdinelli, Statistical Science 10, 1995,
-// section 2), then put into a short order (nearest neighbour and 2-opt). Trial pierces stand in a row in a corner of the sheet,
-// clear of marks; the camera looks at each hole. Shaking: strokes and circles about a mark at nine tenths of the path's
+// section 2), then put into a short order (nearest neighbour and 2-opt). Trial pierces stand in
+// the sheet's corners, clear of marks; the camera looks at each hole. Shaking: strokes and circles about a mark at nine tenths of the path's
 // acceleration in x and in y, then a rest during which the sheet swings out; the camera follows the mark throughout.
 // Frames: the program is written in W; its coordinates are the jet's nominal place, so that the mark stands in the picture.
 // Words: M100 P<mark> takes a look at rest, M101 P<mark> … M102 follows a mark, M3 P<s> … M5 pierces; as
@@ -31,7 +31,7 @@ struct MeasuringPlanOptions {
   double pierce_time_s = 0.5;
   bool elasticity = true;
   double longest_time_s = 40.0;
-  // Corner of the sheet to pierce in; without it the free corner farthest from W's origin.
+  // The only corner of the sheet to pierce in; without it all four are used in turn.
   std::optional<Eigen::Vector2d> scrap_W_mm;
 };
 
