@@ -102,14 +102,16 @@ std::optional<Hole> HoleAt(const MachineDescription& machine, const Prior& prior
 }
 
 // Free places for holes in a row along the sheet's x, from a corner inwards.
-std::vector<Hole> HolesFrom(const MachineDescription& machine, const Prior& prior, const Eigen::Vector2d& corner,
-                            int count) {
+std::vector<Hole> HolesFrom(const MachineDescription& machine, const Prior& prior,
+                            const Eigen::Vector2d& corner, int count) {
   const bool right = corner.x() > 0.5 * machine.sheet_width_mm;
   const bool top = corner.y() > 0.5 * machine.sheet_height_mm;
   const double room = 0.25 * machine.sheet_width_mm;  // of the edge: the rest belongs to parts
   std::vector<Hole> holes;
-  for (double along = kEdge_mm; along <= room && static_cast<int>(holes.size()) < count; along += kHolePitch_mm) {
-    const Eigen::Vector2d p_W(corner.x() + (right ? -along : along), corner.y() + (top ? -kEdge_mm : kEdge_mm));
+  for (double along = kEdge_mm; along <= room && static_cast<int>(holes.size()) < count;
+       along += kHolePitch_mm) {
+    const Eigen::Vector2d p_W(corner.x() + (right ? -along : along),
+                              corner.y() + (top ? -kEdge_mm : kEdge_mm));
     if (auto hole = HoleAt(machine, prior, p_W)) {
       holes.push_back(*hole);
     }
