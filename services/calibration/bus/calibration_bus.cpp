@@ -3,6 +3,7 @@
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
+#include <mutex>
 #include <optional>
 #include <random>
 #include <thread>
@@ -29,6 +30,7 @@ constexpr std::size_t kQueue = 8192;  // over a minute of pictures at 100 Hz
 constexpr std::size_t kBatch = 512;
 constexpr std::chrono::milliseconds kPatience{50};
 constexpr std::chrono::milliseconds kRetry{500};
+constexpr std::chrono::milliseconds kMostWait{2000};
 
 }  // namespace
 
@@ -66,7 +68,7 @@ class CalibrationBus::Inside {
     }
     writer_.emplace(std::move(*writer));
     auto reader = Reader<measured::MeasurementPubSubType>::Open(
-        bus, {measured::MEASUREMENT_TOPIC, idl::schema::k_lambdajet_main_motion_v1_state, "command"},
+        bus, {measured::MEASUREMENT_TOPIC, idl::schema::k_lambdajet_main_motion_v1_state, "setpoint"},
         [this](const measured::Measurement& sample, const Arrival& arrival) { Take(sample, arrival); });
     if (!reader.ok()) {
       return reader.status();
@@ -74,6 +76,13 @@ class CalibrationBus::Inside {
     reader_.emplace(std::move(*reader));
     keeper_ = std::thread([this] { Keep(); });
     return absl::OkStatus();
+  }
+
+  // Until every look that has arrived is in the store; gives up where the store cannot take them.
+  void AwaitKept() {
+    std::unique_lock lock(mutex_);
+    const std::uint64_t wanted = arrived_;
+    changed_.wait_for(lock, kMostWait, [&] { return kept_ >= wanted; });
   }
 
   void Publish(const MachineDescription& machine, const std::string& as_designed_yaml) {
@@ -97,7 +106,10 @@ class CalibrationBus::Inside {
     const auto look = FromWire(sample);
     if (!look || !queue_.Put(*look, arrival)) {
       refused_.Increment();
+      return;
     }
+    const std::lock_guard lock(mutex_);
+    ++arrived_;
   }
 
   void Fill(std::vector<RecordedLook>& batch) {
@@ -119,6 +131,9 @@ class CalibrationBus::Inside {
       const auto added = desk_.TakeLooks(batch);
       if (added.ok()) {
         taken_.Increment(*added);
+        const std::lock_guard lock(mutex_);
+        kept_ += batch.size();
+        changed_.notify_all();
         batch.clear();
         continue;
       }
@@ -141,6 +156,10 @@ class CalibrationBus::Inside {
   std::uint64_t sequence_number_ = 0;
   std::optional<Writer<described::MachineDescriptionPubSubType>> writer_;
   std::optional<Reader<measured::MeasurementPubSubType>> reader_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::uint64_t arrived_ = 0;  // in the queue or beyond
+  std::uint64_t kept_ = 0;
   std::atomic<bool> stop_ = false;
   std::thread keeper_;
 };
@@ -159,6 +178,7 @@ absl::StatusOr<std::unique_ptr<CalibrationBus>> CalibrationBus::Open(Participant
   desk.Listen([inside = room->inside_.get()](const MachineDescription& machine, const std::string& yaml) {
     inside->Publish(machine, yaml);
   });
+  desk.BeforeReading([inside = room->inside_.get()] { inside->AwaitKept(); });
   return room;
 }
 

@@ -158,6 +158,9 @@ SharedMachine CalibrationDesk::active() const {
 }
 
 absl::StatusOr<std::vector<RecordedLook>> CalibrationDesk::Run(std::uint64_t plan) {
+  if (before_reading_) {
+    before_reading_();
+  }
   auto looks = store_->Looks(plan);
   if (looks.ok() && looks->empty()) {
     return Unknown("UNKNOWN_RUN",

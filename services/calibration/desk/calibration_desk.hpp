@@ -54,6 +54,8 @@ class CalibrationDesk {
 
   // Called at once with the active machine and again on every activation, under the desk's lock: hand over and return.
   void Listen(MachineListener listener);
+  // Called before a run is read, so that looks on their way to the store are not missed; set before the doors open.
+  void BeforeReading(std::function<void()> wait) { before_reading_ = std::move(wait); }
   SharedMachine active() const;
   SharedMachine as_designed() const { return as_designed_; }
 
@@ -104,6 +106,7 @@ class CalibrationDesk {
   mutable std::mutex mutex_;
   SharedMachine active_;
   std::vector<MachineListener> listeners_;
+  std::function<void()> before_reading_;
   std::map<std::string, std::shared_ptr<Running>> running_;
   std::unique_ptr<WorkPool> worker_;  // last: its threads use the rest
 };

@@ -1,0 +1,3 @@
+lambdajet_check(bus_calibration LABELS bus TIMEOUT 180 SOURCES calibration_program_test.cpp
+  DEPS calibration_core platform_bus platform_rpc platform_machine_file lambdajet_idl lambdajet_proto test_support)
+add_dependencies(bus_calibration calibration_program)
