@@ -313,12 +313,20 @@ class Reader {
       case 40:
         return Pierce();
       case 50:
-        Switch(OperationKind::kJetOff);
-        jet_on_ = abrasive_on_ = false;
+        JetOff();
         return true;
       default:
         return true;
     }
+  }
+
+  // Abrasive without water would only fill the tube.
+  void JetOff() {
+    if (abrasive_on_) {
+      Switch(OperationKind::kAbrasiveOff);
+    }
+    Switch(OperationKind::kJetOff);
+    jet_on_ = abrasive_on_ = false;
   }
 
   bool Pierce() {
@@ -360,10 +368,11 @@ class Reader {
     }
     const bool jet = block_.Take('P') == 0.0;
     const bool on = m == 620;
-    if (jet) {
-      Switch(on ? OperationKind::kJetOn : OperationKind::kJetOff);
-      jet_on_ = on;
-      abrasive_on_ = abrasive_on_ && on;
+    if (jet && !on) {
+      JetOff();
+    } else if (jet) {
+      Switch(OperationKind::kJetOn);
+      jet_on_ = true;
     } else {
       Switch(on ? OperationKind::kAbrasiveOn : OperationKind::kAbrasiveOff);
       abrasive_on_ = on;
@@ -716,8 +725,7 @@ class Reader {
   // The jet never stays on after the end, as LinuxCNC's M2 stops the spindle.
   void End() {
     if (jet_on_) {
-      Switch(OperationKind::kJetOff);
-      jet_on_ = false;
+      JetOff();
     }
     Add(OperationKind::kEnd);
     ended_ = true;
