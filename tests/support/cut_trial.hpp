@@ -1,0 +1,58 @@
+// Sends one random machine through the whole main job on a virtual clock: cut as set up, measure, identify, cut identified, cut
+// compensated; each cut predicted before and judged after.
+//
+// Model: the shipped cores of trajectory, drive, main motion, calibration, accuracy and inspection; the truth is drawn by the
+// simulated plant's own generator around the machine as designed and nobody but plant and judge reads it.
+// Units: mm, s. Threads: one; the same machine, part and seed give the same trial, bit by bit. Cost: see tests/benchmark/README.md.
+// Errors: `trouble` says in words what could not be done.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+
+#include "foundation/machine/machine_description.hpp"
+#include "inspection/core/comparison.hpp"
+
+namespace lambdajet::tests {
+
+struct TrialPart {
+  std::string program;
+  inspection::Drawing drawing;
+};
+
+// A plate of 300 x 200 mm with two sharp and two rounded corners and three holes.
+TrialPart PlateWithHoles(double kerf_width_mm, double feed_mm_per_s);
+
+struct CutResult {
+  bool cut = false;
+  double p50_mm = 0.0;
+  double p95_mm = 0.0;
+  double max_mm = 0.0;
+  double predicted_95_mm = 0.0;
+  double predicted_95_linear_mm = 0.0;
+  double expected_95_mm = 0.0;
+  double cutting_time_s = 0.0;
+  double event_p99_mm = 0.0;
+  std::uint32_t not_cut = 0;
+  std::uint64_t missing = 0;
+  std::string largest_source;
+
+  bool holds() const { return cut && p95_mm <= predicted_95_mm; }
+};
+
+enum class TrialStage { kSetUp, kIdentified, kCompensated };
+
+struct PlantTrial {
+  std::uint64_t seed = 0;
+  std::string trouble;
+  std::array<CutResult, 3> cuts;
+  double identified_place_mm = 0.0;  // 95 %, worst over the sheet, as identification says
+  double measuring_time_s = 0.0;
+
+  const CutResult& cut(TrialStage stage) const { return cuts[static_cast<std::size_t>(stage)]; }
+};
+
+PlantTrial RunTrial(const MachineDescription& as_designed, const TrialPart& part, std::uint64_t seed);
+
+}  // namespace lambdajet::tests
