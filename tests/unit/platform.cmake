@@ -5,3 +5,4 @@ lambdajet_check(platform_process_test LABELS unit SOURCES platform_process_test.
 lambdajet_check(platform_guard_test LABELS unit SOURCES platform_guard_test.cpp DEPS platform_bus test_support)
 lambdajet_check(platform_hexapod_file_test LABELS unit SOURCES platform_hexapod_file_test.cpp DEPS platform_machine_file)
 lambdajet_check(platform_store_test LABELS unit SOURCES platform_store_test.cpp DEPS platform_store test_support)
+lambdajet_check(platform_log_test LABELS unit SOURCES platform_log_test.cpp DEPS platform_telemetry nlohmann_json::nlohmann_json)

@@ -129,14 +129,12 @@ absl::Status Participant::Inside::AddPeers(dds::DomainParticipantQos& qos, bool 
     qos.wire_protocol().builtin.initialPeersList.push_back(locator);
   }
   qos.wire_protocol().builtin.avoid_builtin_multicast = !addresses->empty();
-  if (!addresses->empty()) {
-    // A unicast metatraffic locator without a port keeps the multicast one from being opened.
+  if (loopback) {
+    // An own unicast metatraffic locator keeps Fast DDS from opening a multicast one.
     Locator_t locator;
     locator.kind = LOCATOR_KIND_UDPv4;
-    IPLocator::setIPv4(locator, loopback ? "127.0.0.1" : "0.0.0.0");
-    if (loopback) {
-      qos.wire_protocol().builtin.metatrafficUnicastLocatorList.push_back(locator);
-    }
+    IPLocator::setIPv4(locator, "127.0.0.1");
+    qos.wire_protocol().builtin.metatrafficUnicastLocatorList.push_back(locator);
   }
   return absl::OkStatus();
 }
