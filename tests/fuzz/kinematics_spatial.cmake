@@ -1,0 +1,2 @@
+lambdajet_check(fuzz_kinematics_hexapod LABELS fuzz TIMEOUT 300 SOURCES kinematics_hexapod_fuzz_test.cpp
+  DEPS kinematics_rpc platform_machine_file)
