@@ -31,6 +31,10 @@ absl::StatusOr<MachineDescription> FromWire(const wire::MachineDescription& samp
           sample.covariance()[kParameterCount * i + j];
     }
   }
+  if (MachineHash(*machine) != machine->hash) {
+    return Trouble(absl::StatusCode::kInvalidArgument, "DESCRIPTION_HASH_MISMATCH",
+                   "the parts make " + MachineHash(*machine) + ", the writer says " + machine->hash);
+  }
   const auto faults = Validate(*machine);
   if (!faults.empty()) {
     return Trouble(absl::StatusCode::kInvalidArgument, "BAD_MACHINE_DESCRIPTION",

@@ -1,0 +1,3 @@
+lambdajet_check(bus_trajectory LABELS bus TIMEOUT 120 SOURCES trajectory_program_test.cpp
+  DEPS trajectory_core platform_bus platform_rpc platform_machine_file lambdajet_idl lambdajet_proto test_support)
+add_dependencies(bus_trajectory trajectory_program)

@@ -1,0 +1,1 @@
+lambdajet_check(papers_trajectory LABELS papers SOURCES trajectory_idle_law_test.cpp DEPS trajectory_core)
