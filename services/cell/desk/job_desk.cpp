@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <random>
 #include <utility>
 
 #include "foundation/contract/trouble.hpp"
@@ -29,6 +30,24 @@ absl::Status WrongState(const Job& job, std::string_view right) {
 
 JobDesk::JobDesk(std::unique_ptr<Journal> journal, const Clock& clock, std::uint64_t session)
     : journal_(std::move(journal)), clock_(clock), conductor_(session) {}
+
+std::uint64_t NewSession() {
+  std::random_device random;
+  return (static_cast<std::uint64_t>(random()) << 32U) | random();
+}
+
+absl::StatusOr<std::unique_ptr<JobDesk>> JobDesk::Open(const std::string& path, const Clock& clock,
+                                                       std::uint64_t session) {
+  auto journal = Journal::Open(path);
+  if (!journal.ok()) {
+    return journal.status();
+  }
+  auto desk = std::make_unique<JobDesk>(std::move(*journal), clock, session);
+  if (absl::Status status = desk->TakeUp(); !status.ok()) {
+    return status;
+  }
+  return desk;
+}
 
 absl::Status JobDesk::TakeUp() {
   const Lock lock(mutex_);
@@ -506,7 +525,8 @@ std::vector<Veto> JobDesk::Vetoes() const {
     vetoes.push_back({"JOURNAL_FAILED", journal_trouble_});
   }
   for (const NodeWord& service : services_) {
-    if (service.name == "trajectory" && service.mode != "SERVING") {  // a start needs a plan; nothing else is needed for it
+    if (service.name == "trajectory" &&
+        service.mode != "SERVING") {  // a start needs a plan; nothing else is needed for it
       vetoes.push_back({"TRAJECTORY_UNREACHABLE", "trajectory does not answer; start it"});
     }
   }

@@ -82,8 +82,15 @@ struct Admission {
   std::string message;
 };
 
+// Numbers this run of the process on the bus.
+std::uint64_t NewSession();
+
 class JobDesk {
  public:
+  // Opens the journal and takes up what it holds.
+  static absl::StatusOr<std::unique_ptr<JobDesk>> Open(const std::string& path, const Clock& clock,
+                                                       std::uint64_t session);
+
   // `session` numbers the commands' writer. The journal is taken over; the clock outlives the desk.
   JobDesk(std::unique_ptr<Journal> journal, const Clock& clock, std::uint64_t session);
 

@@ -159,6 +159,19 @@ class Planner::Trajectory {
   TrajectoryService::Stub stub_;
 };
 
+absl::StatusOr<std::unique_ptr<Planner>> Planner::Open(JobDesk& desk, const CellConfig& config) {
+  ChannelOptions options;
+  options.address = config.trajectory_address;
+  options.ca_file = config.trajectory_ca_file;
+  options.certificate_file = config.trajectory_certificate_file;
+  options.key_file = config.trajectory_key_file;
+  auto channel = OpenChannel(options);
+  if (!channel.ok()) {
+    return channel.status();
+  }
+  return std::make_unique<Planner>(desk, *channel);
+}
+
 Planner::Planner(JobDesk& desk, std::shared_ptr<grpc::Channel> trajectory)
     : desk_(desk),
       trajectory_(std::make_unique<Trajectory>(std::move(trajectory))),

@@ -13,6 +13,7 @@
 #include <string>
 #include <thread>
 
+#include "cell/desk/cell_config.hpp"
 #include "cell/desk/job_desk.hpp"
 
 namespace grpc {
@@ -23,6 +24,7 @@ namespace lambdajet::cell {
 
 class Planner {
  public:
+  static absl::StatusOr<std::unique_ptr<Planner>> Open(JobDesk& desk, const CellConfig& config);
   Planner(JobDesk& desk, std::shared_ptr<grpc::Channel> trajectory);
   // The desk is closed first; waits for the call that is under way, a few seconds at most.
   ~Planner();

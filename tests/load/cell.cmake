@@ -1,0 +1,10 @@
+find_package(CLI11 REQUIRED)
+lambdajet_door(load_generator SOURCES open_loop.cpp load_report.cpp scenarios.cpp
+  DEPS platform_rpc lambdajet_proto foundation_trouble fmt::fmt nlohmann_json::nlohmann_json Threads::Threads)
+target_include_directories(load_generator PUBLIC ${CMAKE_SOURCE_DIR})
+lambdajet_program(lambdajet_load SOURCES main.cpp DEPS load_generator CLI11::CLI11)
+lambdajet_check(load_generator_test LABELS unit SOURCES load_generator_test.cpp DEPS load_generator)
+if(TARGET calibration_program AND TARGET kinematics_program)
+  lambdajet_check(load_slice_test LABELS load SOURCES load_slice_test.cpp DEPS test_support nlohmann_json::nlohmann_json TIMEOUT 120 SERIAL)
+  add_dependencies(load_slice_test lambdajet_load_program cell_program kinematics_program calibration_program)
+endif()
