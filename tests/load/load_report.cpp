@@ -38,14 +38,14 @@ std::string Axis() {
     const double y = Y(value_ms * 1e-3);
     svg += fmt::format(
         "<line x1='{}' x2='{}' y1='{:.1f}' y2='{:.1f}' stroke='#ddd'/><text x='{}' y='{:.1f}' "
-        "text-anchor='end'>{} ms</text>\n",
+        "text-anchor='end'>{:.6g} ms</text>\n",
         kLeft, kWidth - 20.0, y, y, kLeft - 8.0, y + 4.0, value_ms);
   }
   for (int nines = 0; nines <= static_cast<int>(kNines); ++nines) {
     const double share = 1.0 - std::pow(10.0, -nines);
     svg += fmt::format(
         "<line x1='{0:.1f}' x2='{0:.1f}' y1='20' y2='{1}' stroke='#ddd'/><text x='{0:.1f}' y='{2}' "
-        "text-anchor='middle'>{3} %</text>\n",
+        "text-anchor='middle'>{3:.7g} %</text>\n",
         X(share), kHeight - kBottom, kHeight - kBottom + 18.0, share * 100.0);
   }
   return svg;
@@ -73,7 +73,7 @@ std::string Section(const Measured& run) {
       "<p>Blue: from the instant the question was due to its answer. Grey, dashed: how late this machine "
       "woke the generator.</p><table><tr><th>share</th><th>latency ms</th><th>timer ms</th></tr>";
   for (const double share : kShares) {
-    html += fmt::format("<tr><td>{} %</td><td>{:.3f}</td><td>{:.3f}</td></tr>", share * 100.0,
+    html += fmt::format("<tr><td>{:.7g} %</td><td>{:.3f}</td><td>{:.3f}</td></tr>", share * 100.0,
                         run.latency.Percentile_s(share) * 1e3, run.timer.Percentile_s(share) * 1e3);
   }
   html += "</table>\n";
@@ -92,7 +92,7 @@ std::string ToText(const Measured& run) {
   std::string text = fmt::format("{}: {} answered, {} errors at {:.0f}/s\n", run.what, run.latency.count(),
                                  run.error_count(), run.rate_per_s);
   for (const double share : kShares) {
-    text += fmt::format("  {:>8} %  {:10.3f} ms  (timer {:.3f} ms)\n", share * 100.0,
+    text += fmt::format("  {:>8.7g} %  {:10.3f} ms  (timer {:.3f} ms)\n", share * 100.0,
                         run.latency.Percentile_s(share) * 1e3, run.timer.Percentile_s(share) * 1e3);
   }
   for (const auto& [what, value] : run.further) {

@@ -16,7 +16,7 @@
 
 namespace lambdajet::cell {
 
-inline constexpr double kSilence_s = 0.5;
+inline constexpr double kSilence_s = 2.0;
 inline constexpr double kLargestClockOffset_s = 0.2e-3;
 inline constexpr double kNanosecondsPerSecond = 1e9;
 

@@ -1,0 +1,105 @@
+// Starts the real processes of one cell for a test: own DDS domain, free ports, a folder of their own.
+#pragma once
+
+#include <arpa/inet.h>
+#include <gtest/gtest.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <map>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "tests/support/child_process.hpp"
+#include "tests/support/private_domain.hpp"
+#include "tests/support/temporary_folder.hpp"
+
+namespace lambdajet::test {
+
+// A port that nobody has at this moment, for a process that must come back under the same one.
+inline int FreePort() {
+  const int file = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  socklen_t size = sizeof address;
+  if (bind(file, reinterpret_cast<sockaddr*>(&address), size) != 0 ||
+      getsockname(file, reinterpret_cast<sockaddr*>(&address), &size) != 0) {
+    throw std::runtime_error("no free port");
+  }
+  close(file);
+  return ntohs(address.sin_port);
+}
+
+class CellProcesses {
+ public:
+  // Starts a house, also again after it has ended; same port, same files.
+  ChildProcess& Start(const std::string& house) {
+    houses_[house] = std::make_unique<ChildProcess>(Options(house));
+    return *houses_[house];
+  }
+  // Starts them all and waits until each has announced itself.
+  void StartAll(const std::vector<std::string>& houses) {
+    for (const std::string& house : houses) {
+      Start(house);
+    }
+    for (const std::string& house : houses) {
+      ASSERT_TRUE(at(house).WaitUntilReady()) << house << ": " << at(house).err();
+    }
+  }
+  ChildProcess& at(const std::string& house) { return *houses_.at(house); }
+  void Kill(const std::string& house) {
+    at(house).Signal(SIGKILL);
+    at(house).WaitForExit();
+  }
+  std::string address(const std::string& house) { return "127.0.0.1:" + std::to_string(Port(house)); }
+  std::string File(const std::string& name) const { return folder_.File(name); }
+  int domain() const { return domain_.number(); }
+
+  // The last words of every house, for a failing test.
+  std::string Words() {
+    std::string words;
+    for (const auto& [house, child] : houses_) {
+      const std::string all = child->err();
+      words += "--- " + house + (child->running() ? "" : " (ended)") + "\n" +
+               all.substr(all.size() > 3000 ? all.size() - 3000 : 0);
+    }
+    return words;
+  }
+
+ private:
+  int Port(const std::string& house) {
+    const auto found = ports_.find(house);
+    return found != ports_.end() ? found->second : ports_[house] = FreePort();
+  }
+
+  ChildOptions Options(const std::string& house) {
+    ChildOptions options;
+    options.program = house;
+    options.announce_file = folder_.File(house + ".announce.json");
+    options.arguments = {"--config=" + SourceDir() + "/deploy/config/loopback.yaml",
+                         "--bus.domain=" + std::to_string(domain_.number()),
+                         "--rpc.address=" + address(house)};
+    const auto add = [&](const std::string& argument) { options.arguments.push_back(argument); };
+    if (house == "calibration") {
+      add("--machine=" + SourceDir() + "/deploy/config/machine.yaml");
+      add("--store=" + folder_.File("calibration.sqlite"));
+    } else if (house == "cell") {
+      add("--store=" + folder_.File("cell.sqlite"));
+      add("--trajectory.address=" + address("trajectory"));
+    } else if (house == "drive" || house == "main_motion") {
+      add("--plant=" + SourceDir() + "/deploy/plants/shipped.yaml");
+      add("--seed=7");
+    }
+    return options;
+  }
+
+  TemporaryFolder folder_;
+  PrivateDomain domain_;
+  std::map<std::string, int> ports_;
+  std::map<std::string, std::unique_ptr<ChildProcess>> houses_;
+};
+
+}  // namespace lambdajet::test
