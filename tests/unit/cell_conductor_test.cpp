@@ -238,6 +238,7 @@ TEST_F(ConductorTest, ResumesAfterAMainMotionRestartFromWhatWasCutForCertain) {
 }
 
 TEST_F(ConductorTest, FindsTheJobAgainWhenTheDriveWasOnlyOutOfHearing) {
+  machine.length_mm = 500.0;
   Run();
   machine.drive_silent = true;
   ASSERT_TRUE(Reaches(JobState::kInterrupted));
@@ -285,6 +286,7 @@ TEST_F(ConductorTest, ARestartedCellDoesNotStartTwiceWhatNeverMoved) {
 }
 
 TEST_F(ConductorTest, ARestartedCellThatHearsNobodyInterruptsTheJob) {
+  machine.length_mm = 1e6;
   Run();
   machine.drive_silent = machine.main_motion_silent = true;
   CycleUntil([] { return false; }, 2);
