@@ -40,7 +40,7 @@ struct DriveConfig {
   bool hold_on_clock_offset = false;  // while cutting: finish (false) or hold
   double following_error_limit_mm = 0.5;
   std::uint32_t following_error_cycles = 5;
-  std::uint32_t overruns_allowed = 5;  // in overrun_window cycles
+  int overruns_allowed = 5;  // in overrun_window cycles
   std::uint32_t overrun_window = 100;
   double resume_overlap_mm = 1.0;  // a cut that was held is taken up this much earlier
   double retrace_rate = 0.5;
@@ -183,7 +183,7 @@ class DriveCore {
   std::uint32_t overruns_ = 0;
   std::vector<std::uint8_t> late_cycles_;
   std::size_t late_at_ = 0;
-  std::uint32_t late_count_ = 0;
+  int late_count_ = 0;
 
   static constexpr std::size_t kModeChanges = 64;
   std::array<ModeChange, kModeChanges> changes_{};

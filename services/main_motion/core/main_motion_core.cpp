@@ -61,9 +61,12 @@ void MainMotionCore::AdoptMachine(const MachineDescription& machine) {
   machine_known_ = true;
   machine_version_ = machine.version;
   process_ = machine.process;
-  nominal_s_ = {{{process_.jet_off_delay_s, process_.jet_on_delay_s},
-                 {process_.abrasive_off_delay_s, process_.abrasive_on_delay_s}}};
-  delay_s_ = nominal_s_;
+  const decltype(nominal_s_) nominal_s = {{{process_.jet_off_delay_s, process_.jet_on_delay_s},
+                                           {process_.abrasive_off_delay_s, process_.abrasive_on_delay_s}}};
+  if (nominal_s != nominal_s_) {  // a new identification does not make the valves forget
+    nominal_s_ = delay_s_ = nominal_s;
+    delays_seen_ = {};
+  }
 }
 
 void MainMotionCore::Step(std::int64_t now_ns, const MainMotionInputs& inputs) {
@@ -582,8 +585,11 @@ void MainMotionCore::LearnDelay(const OutputEffect& effect, std::int64_t command
   const double nominal_s = nominal_s_[static_cast<std::size_t>(effect.valve)][effect.on ? 1 : 0];
   const double room_s = kDelayClamp * nominal_s + kDelaySlack_s;
   if (std::abs(seen_s - nominal_s) <= room_s) {
+    int& seen = delays_seen_[static_cast<std::size_t>(effect.valve)][effect.on ? 1 : 0];
+    ++seen;
     double& delay = delay_s(effect.valve, effect.on);
-    delay += config_.valve_learning * (seen_s - delay);
+    // The mean of what was seen, then a slow following: the nominal delay is a data sheet's, the first look is the valve's.
+    delay += std::max(config_.valve_learning, 1.0 / seen) * (seen_s - delay);
   }
 }
 

@@ -40,8 +40,8 @@ struct MainMotionConfig {
   double gate_timeout_s = 30.0;
   double camera_interval_s = 0.01;
   double command_age_limit_s = 2.0;
-  double valve_learning = 0.3;  // share of a new delay that is believed
-  std::uint32_t overruns_allowed = 5;
+  double valve_learning = 0.1;  // least share of a newly seen delay that is believed
+  int overruns_allowed = 5;
   std::uint32_t overrun_window = 100;
 };
 
@@ -163,6 +163,7 @@ class MainMotionCore {
   ProcessModel process_;
   std::array<std::array<double, 2>, kValveCount> delay_s_{};  // [valve][off, on], as learnt
   std::array<std::array<double, 2>, kValveCount> nominal_s_{};
+  std::array<std::array<int, 2>, kValveCount> delays_seen_{};
 
   std::uint64_t plan_ = 0;
   std::uint32_t gate_total_ = 0;
@@ -217,7 +218,7 @@ class MainMotionCore {
   std::uint32_t overruns_ = 0;
   std::vector<std::uint8_t> late_cycles_;
   std::size_t late_at_ = 0;
-  std::uint32_t late_count_ = 0;
+  int late_count_ = 0;
   std::uint64_t measurement_sequence_ = 0;
   std::uint64_t record_sequence_ = 0;
 };

@@ -272,6 +272,11 @@ void Visit(Visitor& v, PlantTruth& t) {
 
 }  // namespace
 
+void PlantOptions::Declare(ConfigSchema& schema) {
+  schema.AddPath("plant", &plant, "plant file: what the simulated machine truly is");
+  schema.Add("seed", &seed, {0, kLargestSeed}, "seed of the simulated machine's noise");
+}
+
 absl::StatusOr<PlantTruth> ReadPlantFile(const std::string& path) {
   const absl::StatusOr<std::string> text = ReadWholeFile(path, kMostFileBytes);
   return text.ok() ? ParsePlant(*text, path) : absl::StatusOr<PlantTruth>(text.status());

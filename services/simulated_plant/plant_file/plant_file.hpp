@@ -11,9 +11,18 @@
 #include <string>
 
 #include "absl/status/statusor.h"
+#include "platform/config/schema.hpp"
 #include "simulated_plant/core/plant_truth.hpp"
 
 namespace lambdajet::simulated_plant {
+
+// The settings of a module whose iron is simulated.
+struct PlantOptions {
+  std::string plant = "deploy/plants/shipped.yaml";
+  int seed = 1;
+
+  void Declare(ConfigSchema& schema);
+};
 
 absl::StatusOr<PlantTruth> ReadPlantFile(const std::string& path);
 

@@ -1,0 +1,3 @@
+lambdajet_check(modules_two_nodes_test LABELS system SERIAL TIMEOUT 180 SOURCES modules_two_nodes_test.cpp
+  DEPS bus_cell virtual_cell test_support platform_machine_file)
+add_dependencies(modules_two_nodes_test drive_program main_motion_program)
