@@ -429,8 +429,9 @@ void MainMotionCore::RunRestore() {
 void MainMotionCore::BeginPierce(double pierce_time_s) {
   pierce_ = PiercePhase::kPressure;
   pierce_time_s_ = pierce_time_s;
-  water_since_ns_ = 0;
-  abrasive_there_ = false;
+  // What already flows will not come on a second time.
+  water_since_ns_ = readings_.jet_on ? now_ns_ : 0;
+  abrasive_there_ = readings_.abrasive_on;
   hardware_.SetPump(true);
   hardware_.SetStandOff(config_.stand_off_mm);
 }

@@ -1,0 +1,1 @@
+lambdajet_check(modules_path_clock_test LABELS laws SOURCES modules_path_clock_test.cpp DEPS drive_core)
