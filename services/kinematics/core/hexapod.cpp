@@ -139,8 +139,12 @@ bool WithinStrokes(const HexapodLimits& limits, HexapodInverse& answer) {
 
 bool Finite(const Pose& X_MP) { return X_MP.p_mm.allFinite() && X_MP.R.allFinite(); }
 
+// The kernel's sine and cosine reduce angles up to here; NaN fails every comparison.
+constexpr double kLargestAngleRad = 1e5;
+
 bool Finite(const PlatformPose& pose) {
-  return std::isfinite(pose.x_mm + pose.y_mm + pose.z_mm + pose.psi_rad + pose.theta_rad + pose.gamma_rad);
+  return std::isfinite(pose.x_mm + pose.y_mm + pose.z_mm) && std::abs(pose.psi_rad) <= kLargestAngleRad &&
+         std::abs(pose.theta_rad) <= kLargestAngleRad && std::abs(pose.gamma_rad) <= kLargestAngleRad;
 }
 
 double ParityOf(const std::array<int, kStruts>& order) {

@@ -3,13 +3,16 @@
 // Model: seed paper 004, equation (1), L_j = |C + R B'_j - A_j|, R of the Krylov angles psi, theta, gamma as
 // in foundation/geometry/pose.hpp; with imperfect universal joints at the base (universal_joint.hpp) the
 // length of strut j is that of its joint's equations instead. An actuator reads L_j - l0_j, less the shift of
-// its screw: between two cardan joints the nut turns against the screw by tau_j, which moves it by lead *
-// (tau_j - tau_j at home) / 2 pi. Forward: Newton on the six lengths from a given pose or from home; failure
-// is an answer. Frames: M base, P platform with origin in the pole C, T tool; X_PT is the tool in the
-// platform, rotation and shift, so a tool offset holds for tilted poses too. Units: mm, rad. Shapes: struts
-// are columns and lanes 0 to 5. Validity: |angles| <= 1e5 rad, every strut longer than 0. Poses that are not
-// finite are answered kNotFinite. Threads: a Hexapod is immutable; any. Cost:
-// tests/benchmark/kinematics_hexapod_benchmark.cpp prints it; no allocation.
+// its screw: between two cardan joints the nut turns against the screw by tau_j, which moves it by
+// lead * (tau_j - tau_j at home) / 2 pi.
+// Forward: Newton on the six lengths from a given pose or from home; failure is an answer.
+// Frames: M base, P platform with origin in the pole C, T tool; X_PT is the tool in the platform, rotation
+// and shift, so a tool offset holds for tilted poses too.
+// Units: mm, rad. Shapes: struts are columns and lanes 0 to 5.
+// Validity: |angles| <= 1e5 rad, every strut longer than 0. Other poses are answered kNotFinite, but in
+// blocks, which check nothing.
+// Threads: a Hexapod is immutable; any.
+// Cost: tests/benchmark/kinematics_hexapod_benchmark.cpp prints it; no allocation.
 #pragma once
 
 #include <Eigen/Core>

@@ -2,7 +2,7 @@
 // method.
 //
 // Model: seed paper 004, equation (1) as |C + R B'_j - A_j|, and its universal joints with 10 deviations and
-// the length zero each (README, "Universal joints"). This is the inside of hexapod.hpp and
+// the length zero each (universal_joint.hpp). This is the inside of hexapod.hpp and
 // universal_joint.hpp, which check what they pass in; nobody else includes it. Frames: M base, P platform
 // with its origin in the pole C, Aj the nominal frame of universal joint j. Units: mm, rad. Shapes: eight
 // lanes, strut j in lane j, lanes 6 and 7 repeat strut 5 (so that they stay finite); in blocks, eight poses

@@ -4,8 +4,8 @@
 // than 0; det J = 0 is its parallel (type 2) one. Turns are measured as shifts at the characteristic length,
 // the root mean square distance of the platform's joints from the pole C (Hexapod::lever_mm), so that
 // singular values are in mm of strut for mm of platform. With base and platform symmetric about z, turning
-// the platform by +-90 deg about z at home is singular (det ~ cos psi). Units: mm, rad. Threads: any. Cost:
-// about 10 us (one 6 x 6 singular value decomposition); no allocation.
+// the platform by +-90 deg about z at home is singular.
+// Units: mm, rad. Threads: any. Cost: about 6 us (one 6 x 6 singular value decomposition); no allocation.
 #pragma once
 
 #include <Eigen/Core>
