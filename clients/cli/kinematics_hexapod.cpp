@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "clients/cli/answer_table.hpp"
 #include "clients/cli/csv.hpp"
 #include "foundation/contract/trouble.hpp"
 #include "kinematics/core/hexapod_singularity.hpp"
@@ -69,32 +70,6 @@ void AppendReason(std::vector<std::string>& cells, const HexapodInverse& answer)
   Append(cells, answer.excess);
 }
 
-nlohmann::json JsonOf(const CsvTable& table) {
-  nlohmann::json rows = nlohmann::json::array();
-  for (const auto& cells : table.rows()) {
-    nlohmann::json row;
-    for (std::size_t c = 0; c < cells.size(); ++c) {
-      row[table.columns()[c]] = cells[c];
-    }
-    rows.push_back(row);
-  }
-  return rows;
-}
-
-// The table goes to its file; with --json to standard output as JSON too.
-absl::Status Deliver(const CsvTable& table, const std::string& path, const std::string& said,
-                     Output& output) {
-  if (output.json() && path == "-") {
-    output.Json(JsonOf(table));
-    return absl::OkStatus();
-  }
-  if (const absl::Status status = WriteCsv(path, table); !status.ok()) {
-    return status;
-  }
-  output.Message(said);
-  return absl::OkStatus();
-}
-
 std::string Counted(std::size_t rows, std::size_t refused) {
   return fmt::format("{} rows, {} of them refused", rows, refused);
 }
@@ -122,7 +97,7 @@ absl::Status ForEachPose(const PoseTables& files, const std::vector<std::string>
     refused += fill(*hexapod, row, cells) ? 0 : 1;
     answers.AddRow(std::move(cells));
   }
-  return Deliver(answers, files.out, Counted(rows->size(), refused), output);
+  return DeliverTable(answers, files.out, Counted(rows->size(), refused), output);
 }
 
 std::vector<std::string> PoseColumns() { return {kPoseColumns.begin(), kPoseColumns.end()}; }
@@ -222,7 +197,7 @@ absl::Status TabulateServiceArea(const ServiceAreaOptions& options, Output& outp
     }
     AddServiceRow(at, value, table);
   }
-  return Deliver(table, options.out, fmt::format("{} rows", points), output);
+  return DeliverTable(table, options.out, fmt::format("{} rows", points), output);
 }
 
 }  // namespace
@@ -374,7 +349,7 @@ absl::Status CutHexapodWorkspace(const HexapodWorkspaceOptions& options, Output&
   if (options.out != "-" && !output.json()) {
     output.Table(areas);
   }
-  return Deliver(table, options.out, fmt::format("{} slices", heights.size()), output);
+  return DeliverTable(table, options.out, fmt::format("{} slices", heights.size()), output);
 }
 
 HexapodWorkspaceRequest WorkspaceRequestFor(const Hexapod& hexapod, double step_mm,

@@ -212,9 +212,7 @@ void Output::Fail(ExitCode code, std::string_view reason, std::string_view messa
 }
 
 void Output::Finish(const absl::Status& status) {
-  if (status.ok()) {
-    Exit(ExitCode::kOk);
-  } else {
+  if (!status.ok()) {  // a refusal that the verb has told already stays
     Fail(status);
   }
 }
