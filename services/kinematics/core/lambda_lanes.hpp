@@ -32,7 +32,6 @@ struct Register<8> {
 template <int N>
 struct LaneMask {
   using Bits = typename Register<N>::Bits;
-  __attribute__((vector_size(8 * N)));  // (GCC drops the attribute of a dependent `using`)
   Bits bits;
   friend LaneMask operator&(LaneMask a, LaneMask b) { return {a.bits & b.bits}; }
   bool AllSet() const {

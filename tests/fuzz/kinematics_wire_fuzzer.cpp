@@ -1,0 +1,125 @@
+// Any bytes as a request of kinematics.proto: a status with a reason, or an answer without NaN or infinity.
+//
+// The first byte chooses the question. Workspace and optimisation are cancelled at once: their converters are what is tried.
+#include <cmath>
+#include <string>
+
+#include "foundation/contract/trouble.hpp"
+#include "kinematics/rpc/kinematics_answers.hpp"
+#include "kinematics/rpc/wire_workspace.hpp"
+#include "tests/fuzz/fuzz_target.hpp"
+
+namespace lambdajet::kinematics {
+namespace {
+
+using fuzz::Promise;
+using google::protobuf::FieldDescriptor;
+using google::protobuf::Message;
+
+// Every double of a message and of those in it.
+bool AllFinite(const Message& message) {
+  const auto* reflection = message.GetReflection();
+  std::vector<const FieldDescriptor*> fields;
+  reflection->ListFields(message, &fields);
+  for (const FieldDescriptor* field : fields) {
+    const int count = field->is_repeated() ? reflection->FieldSize(message, field) : 1;
+    for (int i = 0; i < count; ++i) {
+      if (field->cpp_type() == FieldDescriptor::CPPTYPE_DOUBLE) {
+        const double number = field->is_repeated() ? reflection->GetRepeatedDouble(message, field, i)
+                                                   : reflection->GetDouble(message, field);
+        if (!std::isfinite(number)) {
+          return false;
+        }
+      } else if (field->cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE) {
+        const Message& inner = field->is_repeated() ? reflection->GetRepeatedMessage(message, field, i)
+                                                    : reflection->GetMessage(message, field);
+        if (!AllFinite(inner)) {
+          return false;
+        }
+      }
+    }
+  }
+  return true;
+}
+
+template <class Request, class Response, class Ask>
+void Try(const std::string& bytes, Ask ask) {
+  Request request;
+  if (!request.ParseFromString(bytes)) {
+    return;  // gRPC refuses it before it gets to us
+  }
+  Response response;
+  const absl::Status status = ask(request, response);
+  if (status.ok()) {
+    Promise(AllFinite(response), "an answer holds only finite numbers");
+  } else {
+    Promise(!TroubleReason(status).empty(), "trouble has a reason");
+  }
+}
+
+const MachineSlot& Slot() {
+  static const MachineSlot& slot = *[] {
+    auto* made = new MachineSlot;
+    MachineDescription machine;
+    machine.machine_id = "fuzz";
+    machine.parameters.head<kMechanismParameterCount>() = IdealLambda(1200, 600, 700);
+    machine.actuators[0] = machine.actuators[1] = {-1600.0, 2600.0, 1500.0, 15000.0, 400000.0};
+    machine.singular_margin_mm = 20.0;
+    made->Publish(machine);
+    return made;
+  }();
+  return slot;
+}
+
+void Ask(int question, const std::string& bytes) {
+  const KinematicsAnswers answers(Slot());
+  const auto give_up = [] { return true; };
+  switch (question % 9) {
+    case 0:
+      return Try<v1::SolveInverseRequest, v1::SolveInverseResponse>(
+          bytes,
+          [&](const auto& request, auto& response) { return answers.SolveInverse(request, response); });
+    case 1:
+      return Try<v1::SolveForwardRequest, v1::SolveForwardResponse>(
+          bytes,
+          [&](const auto& request, auto& response) { return answers.SolveForward(request, response); });
+    case 2:
+      return Try<v1::SolveInverseBatchRequest, v1::SolveInverseBatchResponse>(
+          bytes, [&](const auto& request, auto& response) { return answers.SolveBatch(request, response); });
+    case 3:
+      return Try<v1::SolveForwardBatchRequest, v1::SolveForwardBatchResponse>(
+          bytes, [&](const auto& request, auto& response) { return answers.SolveBatch(request, response); });
+    case 4:
+      return Try<v1::ComputeJacobianRequest, v1::ComputeJacobianResponse>(
+          bytes,
+          [&](const auto& request, auto& response) { return answers.ComputeJacobian(request, response); });
+    case 5:
+      return Try<v1::ReportSingularityRequest, v1::ReportSingularityResponse>(
+          bytes,
+          [&](const auto& request, auto& response) { return answers.ReportSingularity(request, response); });
+    case 6:
+      return Try<v1::ComputeServiceAreaRequest, v1::ComputeServiceAreaResponse>(
+          bytes,
+          [&](const auto& request, auto& response) { return answers.ComputeServiceArea(request, response); });
+    case 7:
+      return Try<v1::ComputeWorkspaceRequest, v1::ComputeWorkspaceResponse>(
+          bytes, [&](const auto& request, auto& response) {
+            return ComputeWorkspace(Slot(), request, give_up, response);
+          });
+    default:
+      return Try<v1::OptimiseGeometryRequest, v1::OptimiseGeometryResponse>(
+          bytes, [&](const auto& request, auto& response) {
+            return OptimiseGeometry(Slot(), request, give_up, response);
+          });
+  }
+}
+
+}  // namespace
+}  // namespace lambdajet::kinematics
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t size) {
+  if (size > 0) {
+    lambdajet::kinematics::Ask(bytes[0], std::string(reinterpret_cast<const char*>(bytes + 1), size - 1));
+  }
+  return 0;
+}

@@ -1,0 +1,2 @@
+lambdajet_check(system_kinematics_planar_cli LABELS system SOURCES kinematics_planar_cli_test.cpp DEPS test_support)
+add_dependencies(system_kinematics_planar_cli lambdajet_program)
