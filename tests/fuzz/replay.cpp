@@ -79,11 +79,15 @@ int main(int count, char** words) {
     std::fprintf(stderr, "usage: replay FOLDER MUTATIONS\n");
     return 2;
   }
-  std::vector<Bytes> corpus;
+  std::vector<std::filesystem::path> files;
   for (const auto& entry : std::filesystem::directory_iterator(words[1])) {
-    corpus.push_back(ReadAll(entry.path()));
+    files.push_back(entry.path());
   }
-  std::sort(corpus.begin(), corpus.end());
+  std::sort(files.begin(), files.end());  // so that a seed gives the same mutations everywhere
+  std::vector<Bytes> corpus;
+  for (const auto& file : files) {
+    corpus.push_back(ReadAll(file));
+  }
   if (corpus.empty()) {
     std::fprintf(stderr, "no corpus in %s\n", words[1]);
     return 1;
