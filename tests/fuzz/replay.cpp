@@ -2,7 +2,11 @@
 //
 // replay FOLDER MUTATIONS: every file as it is, then so many mutations of each. An input that breaks a promise is left in
 // the file `broken_input` of the working folder.
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <algorithm>
+#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -22,9 +26,21 @@ Bytes ReadAll(const std::filesystem::path& path) {
   return Bytes(std::istreambuf_iterator<char>(file), {});
 }
 
+const Bytes* playing = nullptr;
+
+// Leaves the input that broke something behind; only calls that a signal handler may make.
+void KeepInput(int number) {
+  const int file = open("broken_input", O_WRONLY | O_CREAT | O_TRUNC, 0644);
+  if (file >= 0 && playing != nullptr) {
+    const auto written = write(file, playing->data(), playing->size());
+    (void)written;
+  }
+  std::signal(number, SIG_DFL);
+  std::raise(number);
+}
+
 void Play(const Bytes& input) {
-  std::ofstream("broken_input", std::ios::binary)
-      .write(reinterpret_cast<const char*>(input.data()), static_cast<long>(input.size()));
+  playing = &input;
   LLVMFuzzerTestOneInput(input.data(), input.size());
 }
 
@@ -91,6 +107,9 @@ int main(int count, char** words) {
   if (corpus.empty()) {
     std::fprintf(stderr, "no corpus in %s\n", words[1]);
     return 1;
+  }
+  for (const int number : {SIGABRT, SIGSEGV, SIGFPE, SIGBUS}) {
+    std::signal(number, KeepInput);
   }
   std::mt19937_64 random(1);
   const long mutations = std::atol(words[2]);

@@ -104,7 +104,7 @@ TEST_F(PlanarCli, TracesTheWorkspaceAndSaysWhatBinds) {
 }
 
 TEST_F(PlanarCli, SweepsTheSheetAndRefusesAContact) {
-  const std::string path = Write("path.csv", "x_D_mm,y_D_mm\n100,500\n300,500\n");
+  const std::string path = Write("path.csv", "x_D_mm,y_D_mm\n100,500\n600,500\n");
   EXPECT_EQ(Run({"sweep", "--machine", Machine(), "--in", path, "--body", "900", "0", "1000", "2000"}), 4);
   EXPECT_THAT(out_, HasSubstr("x_D 400"));
   EXPECT_EQ(Run({"sweep", "--machine", Machine(), "--in", path, "--body", "1900", "0", "2000", "2000"}), 0)
