@@ -1,8 +1,10 @@
 """Starts the processes of one cell on this host, waits until they serve, stops them in order."""
 
+import contextlib
 import json
 import pathlib
 import signal
+import socket
 import subprocess
 import time
 
@@ -13,14 +15,26 @@ START_ORDER = ("calibration", "drive", "main_motion", "kinematics", "trajectory"
 STOP_ORDER = ("cell", "trajectory", "accuracy", "kinematics", "drive", "main_motion", "calibration", JUDGE)
 
 
+def free_ports():
+    """A free TCP port for each process; all are open at once so that they differ."""
+    with contextlib.ExitStack() as stack:
+        sockets = {name: stack.enter_context(socket.socket()) for name in START_ORDER}
+        for one in sockets.values():
+            one.bind(("127.0.0.1", 0))
+        return {name: one.getsockname()[1] for name, one in sockets.items()}
+
+
 class StartFailed(Exception):
     """A process did not come up; the text says which, why, and where its log is."""
 
 
 class LocalProcesses:
-    """Every process as a child of this one. Logs and announce files lie in the run's folder."""
+    """Every process as a child of this one. Logs and announce files lie in the run's folder. flags: more flags for every
+    process; ports: name -> gRPC port, for those that shall not listen where their file says."""
 
-    def __init__(self, source, build, run_folder, options):
+    def __init__(self, source, build, run_folder, options, flags=(), ports=None):
+        self.flags = list(flags)
+        self.ports = ports or {}
         self.source = source
         self.bin = build / "bin"
         self.folder = run_folder
@@ -38,16 +52,23 @@ class LocalProcesses:
             flags += [f"--store={self.folder / 'cell.sqlite'}"]
         if name in ("drive", "main_motion"):
             flags += [f"--plant={self.options.plant}", f"--seed={self.options.seed}"]
-        return flags
+        if name in self.ports:
+            flags += [f"--rpc.address=127.0.0.1:{self.ports[name]}"]
+        if name == "cell" and self.ports:
+            flags += [f"--services.{other}=127.0.0.1:{self.ports[other]}" for other in ("trajectory", "calibration")]
+        return flags + self.flags
 
     def start(self):
-        """Starts all; returns the seconds until the last of the seven served."""
+        """Starts all; returns the instant, time.monotonic()."""
         self.folder.mkdir(parents=True, exist_ok=True)
         started = time.monotonic()
         for name in START_ORDER:
-            announce = self.folder / f"{name}.announce.json"
-            announce.unlink(missing_ok=True)
-            log = open(self.folder / f"{name}.log", "wb")
+            self.start_one(name)
+        return started
+
+    def start_one(self, name):
+        (self.folder / f"{name}.announce.json").unlink(missing_ok=True)
+        with open(self.folder / f"{name}.log", "ab") as log:
             # A session of its own: Ctrl-C reaches only this program, which stops the cell in order.
             self.children[name] = subprocess.Popen(
                 [str(self.bin / name)] + self.arguments(name),
@@ -56,8 +77,14 @@ class LocalProcesses:
                 stderr=log,
                 start_new_session=True,
             )
-            log.close()
-        return started
+
+    def kill(self, name):
+        """As a crash would: no orderly end. Returns the instant, CLOCK_MONOTONIC ns."""
+        child = self.children.pop(name)
+        instant = time.monotonic_ns()
+        child.kill()
+        child.wait()
+        return instant
 
     def announced(self, name):
         """The process' announce file, or None while it has not written it."""

@@ -34,6 +34,8 @@ def parse():
     parser.add_argument("--containers", action="store_true", help="every process in a container of its own (podman, root)")
     parser.add_argument("--output", type=pathlib.Path, default=SOURCE / "build" / "demo", help="folder of the report (default: build/demo)")
     parser.add_argument("--build-folder", type=pathlib.Path, default=SOURCE / "build" / "release", help=argparse.SUPPRESS)
+    parser.add_argument("--domain", type=int, help=argparse.SUPPRESS)  # tests: a DDS domain of their own
+    parser.add_argument("--free-ports", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
     for name in ("plant", "part", "machine", "output", "build_folder"):
         setattr(options, name, getattr(options, name).resolve())
@@ -246,7 +248,11 @@ def make_processes(options):
         import cell_containers
 
         return cell_containers.Containers(SOURCE, run_folder, options)
-    return cell_processes.LocalProcesses(SOURCE, options.build_folder, run_folder, options)
+    flags = [f"--bus.domain={options.domain}"] if options.domain else []
+    ports = cell_processes.free_ports() if options.free_ports else None
+    if ports:
+        flags.append("--metrics.address=127.0.0.1:0")
+    return cell_processes.LocalProcesses(SOURCE, options.build_folder, run_folder, options, flags, ports)
 
 
 def start(run, processes, console):
