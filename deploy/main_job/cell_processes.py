@@ -55,7 +55,7 @@ class LocalProcesses:
         if name in self.ports:
             flags += [f"--rpc.address=127.0.0.1:{self.ports[name]}"]
         if name == "cell" and self.ports:
-            flags += [f"--services.{other}=127.0.0.1:{self.ports[other]}" for other in ("trajectory", "calibration")]
+            flags += [f"--trajectory.address=127.0.0.1:{self.ports['trajectory']}"]
         return flags + self.flags
 
     def start(self):
