@@ -31,8 +31,8 @@ endif()
 
 # Every target of ours: warnings are errors; includes start at services/ and at the generated roots.
 function(lambdajet_own_code target)
-  # -Wno-restrict: g++ 12 reports its own std::string `"literal" + temporary` (GCC bug 105651).
-  target_compile_options(${target} PRIVATE -Wall -Wextra -Wshadow -Wnon-virtual-dtor -Wno-restrict -Werror)
+  # -Wno-restrict: g++ 12 reports its own std::string `"literal" + temporary` (GCC bug 105651); clang does not know it.
+  target_compile_options(${target} PRIVATE -Wall -Wextra -Wshadow -Wnon-virtual-dtor $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict> -Werror)
   target_include_directories(${target} PUBLIC ${CMAKE_SOURCE_DIR}/services)
 endfunction()
 
