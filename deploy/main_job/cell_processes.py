@@ -79,9 +79,9 @@ class LocalProcesses:
             )
 
     def kill(self, name):
-        """As a crash would: no orderly end. Returns the instant, CLOCK_MONOTONIC ns."""
+        """As a crash would: no orderly end. Returns the instant in the modules' common time, ns."""
         child = self.children.pop(name)
-        instant = time.monotonic_ns()
+        instant = time.time_ns()
         child.kill()
         child.wait()
         return instant

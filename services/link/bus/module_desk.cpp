@@ -163,10 +163,14 @@ class ModuleDesk::Inside {
     } else {
       write(motion_events_, motion_wire::Event());
     }
+    const std::initializer_list<LogField> fields = {{"to", Name(change.to)},
+                                                    {"reason", Name(change.reason)},
+                                                    {"common_time_ns", change.time_ns},
+                                                    {"s_mm", change.s_mm}};
     if (bad) {
-      log_.Warning("mode", text, {{"s_mm", change.s_mm}});
+      log_.Warning("mode", text, fields);
     } else {
-      log_.Info("mode", text, {{"s_mm", change.s_mm}});
+      log_.Info("mode", text, fields);
     }
   }
 
