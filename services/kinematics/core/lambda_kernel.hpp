@@ -165,17 +165,19 @@ Assembly<S> Assemble(const Geometry<S>& g, const Readings<S>& q, double assembly
   const S dx = a.slider_2.x - a.slider_1.x;
   const S dy = a.slider_2.y - a.slider_1.y;
   a.distance_mm = sqrt(dx * dx + dy * dy);
-  const S ex = dx / a.distance_mm;
-  const S ey = dy / a.distance_mm;
+  const S inverse = 1.0 / a.distance_mm;
+  const S ex = dx * inverse;
+  const S ey = dy * inverse;
   const S attach = g.ratio * g.main_mm;
-  const S foot = 0.5 * (a.distance_mm + (attach - g.second_mm) * (attach + g.second_mm) / a.distance_mm);
+  const S foot = 0.5 * (a.distance_mm + (attach - g.second_mm) * (attach + g.second_mm) * inverse);
   a.height_2_mm2 = (attach - foot) * (attach + foot);
   const S height = SideOf(S(dx * g.rail_1.cosine + dy * g.rail_1.sine), assembly_mode, rails_apart) *
                    RootOrZero(a.height_2_mm2);
   const S ax = foot * ex - height * ey;
   const S ay = foot * ey + height * ex;
   a.attachment = {a.slider_1.x + ax, a.slider_1.y + ay};
-  a.tool = {a.slider_1.x + ax / g.ratio, a.slider_1.y + ay / g.ratio};
+  const S stretch = 1.0 / g.ratio;
+  a.tool = {a.slider_1.x + ax * stretch, a.slider_1.y + ay * stretch};
   return a;
 }
 
