@@ -4,12 +4,14 @@
 #include <cmath>
 #include <numbers>
 
+#include "accuracy/core/jet_stack.hpp"
+
 namespace lambdajet::accuracy {
 namespace {
 
-constexpr std::array<std::string_view, kSourceCount> kSourceNames = {"BASE",     "SHEET",      "MECHANISM",
-                                                                     "ELASTIC",  "FOLLOWING",  "STRAIGHTNESS",
-                                                                     "BACKLASH", "JET_WANDER", "JET_LAG"};
+constexpr std::array<std::string_view, kSourceCount> kSourceNames = {
+    "BASE",      "SHEET",        "MECHANISM", "JET_OFFSET", "ELASTIC",
+    "FOLLOWING", "STRAIGHTNESS", "BACKLASH",  "JET_WANDER", "JET_LAG"};
 
 constexpr Eigen::Index Index(Parameter p) { return static_cast<Eigen::Index>(p); }
 
@@ -51,7 +53,13 @@ ErrorChain::ErrorChain(const MachineDescription& machine)
       reference_feed_mm_per_s(machine.path.feed_mm_per_s),
       jet_lag_time_s(machine.process.jet_lag_time_s),
       elastic_lag_s2(machine.value(Parameter::kElasticLagS2)),
-      damping_time_s(machine.value(Parameter::kDampingTimeS)) {}
+      damping_time_s(machine.value(Parameter::kDampingTimeS)) {
+  if (machine.version == 0) {
+    const JetStack stack = TypicalJetStack();
+    jet_offset_mm = {stack.nozzle_tilt_rad * stack.nozzle_to_exit_mm,
+                     stack.tube_tilt_rad * stack.tube_length_mm, stack.radial_offset_mm};
+  }
+}
 
 PlaceSensitivity SensitivityAt(const ErrorChain& chain, const Eigen::Vector2d& p_W_mm) {
   PlaceSensitivity place;
@@ -82,6 +90,8 @@ std::array<double, kSourceCount> VarianceBySource(const ErrorChain& chain, const
     const auto k = static_cast<Eigen::Index>(i);
     At(variance, SourceOf(static_cast<Parameter>(i))) += share[k] * row[k];
   }
+  const std::array<double, 3>& offset = chain.jet_offset_mm;
+  At(variance, Source::kJetOffset) = 0.5 * (Square(offset[0]) + Square(offset[1]) + Square(offset[2]));
   const Eigen::Vector2d slider = place.J_p_q.transpose() * n_W;
   const Eigen::Vector2d rail = place.J_p_rail.transpose() * n_W;
   const Eigen::Vector2d rate = place.J_q_p * v_W_mm_per_s / chain.reference_feed_mm_per_s;

@@ -30,6 +30,7 @@ enum class Source : std::uint8_t {
   kBase,
   kSheet,
   kMechanism,
+  kJetOffset,
   kElastic,
   kFollowing,
   kStraightness,
@@ -91,6 +92,8 @@ struct ErrorChain {
   double jet_lag_time_s;
   double elastic_lag_s2;
   double damping_time_s;
+  std::array<double, 3>
+      jet_offset_mm{};  // nozzle, tube and stack, each of unknown azimuth; 0 once identified
 
   // Where the effector must stand for the jet to be over p_W.
   Eigen::Vector2d EffectorAt(const Eigen::Vector2d& p_W_mm) const {

@@ -19,6 +19,14 @@ std::vector<Eigen::Vector2d> Grid(const MachineDescription& machine, const Error
   return grid;
 }
 
+double JetOffsetVariance(const ErrorChain& chain) {
+  double square = 0.0;
+  for (const double radius : chain.jet_offset_mm) {
+    square += radius * radius;
+  }
+  return 0.5 * square;  // each coordinate
+}
+
 double LargerEigenvalue(const Eigen::Matrix2d& m) {
   const double middle = 0.5 * (m(0, 0) + m(1, 1));
   return middle + std::hypot(0.5 * (m(0, 0) - m(1, 1)), m(0, 1));
@@ -39,7 +47,7 @@ PlaceError PlaceErrorAt(const ErrorChain& chain, const Eigen::Vector2d& p_W_mm, 
       place.J_p_parameters * chain.covariance * place.J_p_parameters.transpose() +
       slider * place.J_p_q * place.J_p_q.transpose() +
       u.straightness_mm * u.straightness_mm * place.J_p_rail * place.J_p_rail.transpose() +
-      u.jet_wander_mm * u.jet_wander_mm * Eigen::Matrix2d::Identity();
+      (u.jet_wander_mm * u.jet_wander_mm + JetOffsetVariance(chain)) * Eigen::Matrix2d::Identity();
   error.valid = true;
   error.mean_mm = mean_mm;
   error.sigma_mm = std::sqrt(std::max(0.0, LargerEigenvalue(spread)));

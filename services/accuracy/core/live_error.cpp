@@ -42,6 +42,7 @@ LiveError LiveEstimator::Update(const ErrorChain& chain, const DriveMotion& driv
   live.bound_95_mm = error.bound_95_mm;
   live.base_mm = std::sqrt(std::max(0.0, Part(error.variance_by_source_mm2, Source::kBase) +
                                              Part(error.variance_by_source_mm2, Source::kSheet) +
+                                             Part(error.variance_by_source_mm2, Source::kJetOffset) +
                                              Part(error.variance_by_source_mm2, Source::kMechanism)));
   live.elastic_mm = Part(error.bias_by_source_mm, Source::kElastic);
   const double lag_mm = Part(error.bias_by_source_mm, Source::kJetLag);

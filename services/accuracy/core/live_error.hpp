@@ -23,7 +23,7 @@ struct LiveError {
   bool valid = false;
   Eigen::Vector2d p_WJ_mm = Eigen::Vector2d::Zero();
   double bound_95_mm = 0.0;
-  double base_mm = 0.0;             // one sigma of base, sheet and mechanism together
+  double base_mm = 0.0;             // one sigma of base, sheet, mechanism and jet offset together
   double elastic_mm = 0.0;          // signed bias, quasi-static
   double process_mm = 0.0;          // jet lag's bias and jet wander's sigma, root of squares
   double following_error_mm = 0.0;  // at the tool

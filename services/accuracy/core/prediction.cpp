@@ -227,6 +227,9 @@ enum Drawn : std::uint64_t {
   kRail2Sine,
   kRail2Cosine,
   kLag,
+  kAzimuth1,
+  kAzimuth2,
+  kAzimuth3,
   kFirstPoint = 40
 };
 
@@ -241,7 +244,8 @@ struct DrawnMachine {
   Eigen::Array2d backlash_mm;  // half width
   Eigen::Array2d sine_mm;
   Eigen::Array2d cosine_mm;
-  double lag_factor;  // on the lag's inset, which goes with the square of its time
+  Eigen::Vector2d jet_offset_mm;  // on the sheet
+  double lag_factor;              // on the lag's inset, which goes with the square of its time
 };
 
 DrawnMachine DrawMachine(const ContourModel& model, const CounterStream& random) {
@@ -263,6 +267,11 @@ DrawnMachine DrawMachine(const ContourModel& model, const CounterStream& random)
   m.sine_mm = u.straightness_mm * Eigen::Array2d(random.Normal(kRail1Sine), random.Normal(kRail2Sine));
   m.cosine_mm = u.straightness_mm * Eigen::Array2d(random.Normal(kRail1Cosine), random.Normal(kRail2Cosine));
   m.lag_factor = Square(std::max(0.0, 1.0 + u.jet_lag_relative * random.Normal(kLag)));
+  m.jet_offset_mm.setZero();
+  for (std::size_t i = 0; i < chain.jet_offset_mm.size(); ++i) {
+    const double azimuth_rad = 2.0 * std::numbers::pi * random.Uniform(2 * (kAzimuth1 + i));
+    m.jet_offset_mm += chain.jet_offset_mm[i] * Eigen::Vector2d(std::cos(azimuth_rad), std::sin(azimuth_rad));
+  }
   return m;
 }
 
@@ -271,10 +280,10 @@ DrawnMachine DrawMachine(const ContourModel& model, const CounterStream& random)
 double ParameterDeviation(const ErrorChain& chain, const DrawnMachine& m, const ContourModel::Point& point) {
   const auto forward = kinematics::SolveForward(m.mechanism, point.actuator_position_mm);
   if (!forward.positioned) {
-    return point.n_W.dot(point.place.J_p_parameters * (m.parameters - chain.parameters));
+    return point.n_W.dot(point.place.J_p_parameters * (m.parameters - chain.parameters) + m.jet_offset_mm);
   }
   const Eigen::Vector2d p_W = m.R_WE * (m.X_DJ.translation_mm() - forward.p_DE_mm - m.p_EW_mm);
-  return point.n_W.dot(p_W - point.p_W_mm);
+  return point.n_W.dot(p_W - point.p_W_mm + m.jet_offset_mm);
 }
 
 double SliderDeviation(const DrawnMachine& m, const ContourModel::Point& point) {

@@ -1,6 +1,6 @@
 // Predicts how far from the drawing a planned cut will be, before it is cut.
 //
-// Model: the deviation of the cut contour along its normal is a bias and a spread from nine sources
+// Model: the deviation of the cut contour along its normal is a bias and a spread from ten sources
 // (core/error_chain.hpp). What is constant for a machine (parameters, slider lags, backlash, rail waves) is
 // drawn once a cut and is fully correlated along the contour; jet wander is drawn at each point. The spring
 // is played over the whole plan with L d'' + C d' + d = -L a, or, compensated, (L0 - L) a + (C - C0) L0 a'

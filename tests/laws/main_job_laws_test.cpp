@@ -1,0 +1,44 @@
+// A slice of twenty plants: the whole main job on random machines keeps its promises.
+#include <gtest/gtest.h>
+
+#include "platform/machine_file/machine_file.hpp"
+#include "tests/support/child_process.hpp"
+#include "tests/support/cut_trial.hpp"
+
+namespace lambdajet::tests {
+namespace {
+
+TEST(MainJob, ReachesItsNumbersOnMachinesItDoesNotKnow) {
+  const auto machine = ReadMachineFile(test::SourceDir() + "/deploy/config/machine.yaml");
+  ASSERT_TRUE(machine.ok()) << machine.status();
+  const TrialPart part = PlateWithHoles(machine->process.kerf_width_mm, machine->path.feed_mm_per_s);
+  for (const std::uint64_t seed : {1, 4}) {
+    const PlantTrial trial = RunTrial(*machine, part, seed);
+    ASSERT_TRUE(trial.trouble.empty()) << trial.trouble;
+    for (const CutResult& cut : trial.cuts) {
+      EXPECT_TRUE(cut.cut);
+      EXPECT_EQ(cut.not_cut, 0u);
+      EXPECT_EQ(cut.missing, 0u);
+      EXPECT_TRUE(cut.holds()) << cut.p95_mm << " found, " << cut.predicted_95_mm << " predicted";
+    }
+    EXPECT_LE(trial.cut(TrialStage::kIdentified).p95_mm, 0.50);
+    EXPECT_LE(trial.cut(TrialStage::kCompensated).p95_mm, 0.15);
+    EXPECT_LT(trial.cut(TrialStage::kCompensated).predicted_95_mm, 0.25);
+    EXPECT_LT(trial.cut(TrialStage::kCompensated).p95_mm, trial.cut(TrialStage::kIdentified).p95_mm);
+  }
+}
+
+TEST(MainJob, IsTheSameBitByBit) {
+  const auto machine = ReadMachineFile(test::SourceDir() + "/deploy/config/machine.yaml");
+  ASSERT_TRUE(machine.ok());
+  const TrialPart part = PlateWithHoles(machine->process.kerf_width_mm, machine->path.feed_mm_per_s);
+  const PlantTrial once = RunTrial(*machine, part, 5);
+  const PlantTrial again = RunTrial(*machine, part, 5);
+  for (std::size_t i = 0; i < once.cuts.size(); ++i) {
+    EXPECT_EQ(once.cuts[i].p95_mm, again.cuts[i].p95_mm);
+    EXPECT_EQ(once.cuts[i].predicted_95_mm, again.cuts[i].predicted_95_mm);
+  }
+}
+
+}  // namespace
+}  // namespace lambdajet::tests
