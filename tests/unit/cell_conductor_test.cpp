@@ -216,6 +216,19 @@ TEST_F(ConductorTest, StarvationHoldsTheJobAndItGoesOnByItself) {
   ASSERT_TRUE(Reaches(JobState::kCompleted));
 }
 
+TEST_F(ConductorTest, AHoldForALinkThatIsBackGoesOnByItselfAHoldOnCommandDoesNot) {
+  Run();
+  machine.view.drive->mode = ModuleMode::kHeld;
+  machine.view.drive->reason = ModuleReason::kPeerLost;
+  ASSERT_TRUE(Reaches(JobState::kHeld));
+  ASSERT_TRUE(Reaches(JobState::kRunning));
+  machine.view.drive->mode = ModuleMode::kHeld;
+  machine.view.drive->reason = ModuleReason::kCommanded;
+  ASSERT_TRUE(Reaches(JobState::kHeld));
+  CycleUntil([] { return false; }, 500);
+  EXPECT_EQ(job.progress.state, JobState::kHeld);
+}
+
 TEST_F(ConductorTest, ResumesAfterAMainMotionRestartFromWhatWasCutForCertain) {
   Run();
   ASSERT_TRUE(CycleUntil([&] { return machine.view.main_motion->s_mm >= 20.0; }));

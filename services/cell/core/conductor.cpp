@@ -21,6 +21,8 @@ constexpr double kMotionAfterStart_s = 2.0;
 constexpr double kStreamingCheck_s = 1.0;
 constexpr double kMainMotionAfterDrive_s = 10.0;
 constexpr std::uint32_t kEventsFilledEnough = 16;
+constexpr double kLinkStands_s = 0.5;  // both heard for so long after a hold for a lost link: it is back
+constexpr int kMostLinkResumes = 10;   // in one run; a link that is lost more often needs a person
 
 std::string Text(double value, const char* unit) {
   char text[48];
@@ -554,6 +556,8 @@ void Conductor::BeginFollowing(const MachineView& machine, std::int64_t now_ns) 
   drive_session_ = machine.drive->session;
   main_motion_session_ = machine.main_motion->session;
   drive_complete_ns_ = 0;
+  link_resumes_ = 0;
+  link_held_ns_ = 0;
   streaming_asked_ = false;
   streaming_reason_.clear();
   stand_reason_.clear();
@@ -607,8 +611,27 @@ void Conductor::Follow(const MachineView& machine, std::int64_t now_ns) {
   }
   FollowDriveMode(*machine.drive, *machine.main_motion, now_ns);
   if (phase_ == Phase::kFollowing) {
+    ResumeAfterLinkLoss(*machine.drive, now_ns);
     KeepStreaming(*machine.drive, now_ns);
   }
+}
+
+// A link that was lost for less than the drive's patience leaves the drive held, nothing stopped and nothing latched: the
+// cell lets it go on, backed up and pierced again as after any hold.
+void Conductor::ResumeAfterLinkLoss(const DriveView& drive, std::int64_t now_ns) {
+  if (drive.mode != ModuleMode::kHeld || drive.reason != ModuleReason::kPeerLost) {
+    link_held_ns_ = 0;
+    return;
+  }
+  link_held_ns_ = link_held_ns_ == 0 ? now_ns : link_held_ns_;
+  if (Waiting(kDriveTarget) || link_resumes_ >= kMostLinkResumes ||
+      SecondsBetween(link_held_ns_, now_ns) < kLinkStands_s) {
+    return;
+  }
+  ++link_resumes_;
+  link_held_ns_ = 0;
+  Tell(Happening::kNoted, "PEER_LOST", "the link between the modules was lost for a moment; going on");
+  Send(kDriveTarget, Verb::kResume, now_ns);
 }
 
 void Conductor::FollowDriveMode(const DriveView& drive, const MainMotionView& main_motion,

@@ -194,6 +194,7 @@ class Conductor {
   void StepAwaitingMotion(const MachineView& machine, std::int64_t now_ns);
   void Follow(const MachineView& machine, std::int64_t now_ns);
   void FollowDriveMode(const DriveView& drive, const MainMotionView& main_motion, std::int64_t now_ns);
+  void ResumeAfterLinkLoss(const DriveView& drive, std::int64_t now_ns);
   void KeepStreaming(const DriveView& drive, std::int64_t now_ns);
   std::optional<Refusal> Loss(const MachineView& machine, std::int64_t now_ns) const;
   std::optional<Refusal> ModuleFell(const ModuleView& module, const char* name, std::uint64_t session) const;
@@ -229,6 +230,8 @@ class Conductor {
   std::int64_t next_streaming_ns_ = 0;
   std::string streaming_reason_;
   std::int64_t drive_complete_ns_ = 0;
+  std::int64_t link_held_ns_ = 0;
+  int link_resumes_ = 0;
   bool operator_command_ = false;
   std::optional<Refusal> reset_trouble_;
   std::optional<Refusal> operator_trouble_;

@@ -312,8 +312,14 @@ absl::StatusOr<LiveJob> JobDesk::WaitUntilStarted(Lock& lock, const std::string&
   return Live(*now);
 }
 
+// A job that has just completed is still being unloaded for a moment.
+void JobDesk::WaitUntilUnloaded(Lock& lock, double patience_s) {
+  WaitFor(lock, patience_s, [&] { return conductor_.phase() != Phase::kUnloading; });
+}
+
 absl::StatusOr<LiveJob> JobDesk::Start(const std::string& job_id, double patience_s) {
   Lock lock(mutex_);
+  WaitUntilUnloaded(lock, patience_s);
   const auto job = Current(job_id);
   if (!job.ok()) {
     return job.status();
@@ -337,6 +343,7 @@ absl::StatusOr<LiveJob> JobDesk::Start(const std::string& job_id, double patienc
 
 absl::StatusOr<LiveJob> JobDesk::Resume(const std::string& job_id, double overlap_mm, double patience_s) {
   Lock lock(mutex_);
+  WaitUntilUnloaded(lock, patience_s);
   const auto job = Current(job_id);
   if (!job.ok()) {
     return job.status();
@@ -459,6 +466,7 @@ absl::StatusOr<double> JobDesk::Override(double factor, double patience_s) {
 
 absl::StatusOr<MachineWord> JobDesk::Reset(double patience_s) {
   Lock lock(mutex_);
+  WaitUntilUnloaded(lock, patience_s);
   if (const auto refusal = conductor_.Reset(machine_, clock_.now_ns())) {
     return Precondition(*refusal);
   }

@@ -149,6 +149,7 @@ class JobDesk {
   absl::Status CheckMayStart(const Job& job);
   template <typename Condition>
   bool WaitFor(Lock& lock, double patience_s, Condition&& condition);
+  void WaitUntilUnloaded(Lock& lock, double patience_s);
   absl::StatusOr<LiveJob> WaitUntilStarted(Lock& lock, const std::string& job_id, double patience_s);
   void CheckpointIfDue(std::int64_t now_ns);
 
