@@ -1,7 +1,283 @@
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "clients/cli/csv.hpp"
+#include "clients/cli/text_file.hpp"
+#include "clients/cli/trajectory_pictures.hpp"
 #include "clients/cli/verbs.hpp"
+#include "foundation/contract/trouble.hpp"
+#include "platform/machine_file/machine_file.hpp"
+#include "trajectory/core/feed/plan_program.hpp"
+#include "trajectory/core/feed/plan_samples.hpp"
+#include "trajectory/core/part_program/gcode_reader.hpp"
 
 namespace lambdajet::cli {
+namespace {
 
-void AddTrajectoryVerbs(CLI::App&, Output&) {}
+using trajectory::PlannedProgram;
+using trajectory::PlanOptions;
+using trajectory::ProgramFault;
+
+constexpr double kDefaultStep_s = 0.004;
+
+struct ProgramVerb {
+  std::string program;
+  std::string machine = "deploy/config/machine.yaml";
+  std::string out;
+  std::string colour = "speed";
+  double step_s = kDefaultStep_s;
+  double start_from_s_mm = -1.0;
+  PlanOptions options;
+};
+
+// Prints what is wrong as compilers do, FILE:LINE:COLUMN, and ends with the exit code of a refusal.
+void TellFaults(const std::string& file, const std::vector<ProgramFault>& faults, Output& output) {
+  nlohmann::json list = nlohmann::json::array();
+  for (const ProgramFault& fault : faults) {
+    const std::string place = file + ":" + std::to_string(fault.line) +
+                              (fault.column > 0 ? ":" + std::to_string(fault.column) : "");
+    output.Text(place + ": " + std::string(fault.reason) +
+                    (fault.word.empty() ? "" : " '" + fault.word + "'") + ": " + fault.message,
+                Tone::kBad);
+    list.push_back({{"line", fault.line},
+                    {"column", fault.column},
+                    {"reason", std::string(fault.reason)},
+                    {"word", fault.word},
+                    {"message", fault.message}});
+  }
+  output.Json({{"faults", list}});
+  output.Exit(ExitCode::kRefused);
+}
+
+absl::Status Canon(const ProgramVerb& verb, Output& output) {
+  const auto text = ReadTextFile(verb.program);
+  if (!text.ok()) {
+    return text.status();
+  }
+  const trajectory::PartProgram program = trajectory::ReadGcode(*text);
+  if (!program.faults.empty()) {
+    TellFaults(verb.program, program.faults, output);
+    return absl::OkStatus();
+  }
+  for (const trajectory::Operation& o : program.operations) {
+    output.Text(FormatOperation(o));
+    if (output.json()) {
+      output.Json({{"line", o.line},
+                   {"operation", std::string(OperationName(o.kind))},
+                   {"x_W_mm", o.x_W_mm},
+                   {"y_W_mm", o.y_W_mm},
+                   {"center_x_W_mm", o.center_x_W_mm},
+                   {"center_y_W_mm", o.center_y_W_mm},
+                   {"sweep_rad", o.sweep_rad},
+                   {"feed_mm_per_s", o.feed_mm_per_s},
+                   {"value", o.value}});
+    }
+  }
+  return absl::OkStatus();
+}
+
+absl::Status Check(const ProgramVerb& verb, Output& output) {
+  const auto text = ReadTextFile(verb.program);
+  const auto machine = ReadMachineFile(verb.machine);
+  if (!text.ok() || !machine.ok()) {
+    return text.ok() ? machine.status() : text.status();
+  }
+  const trajectory::Admission admission = trajectory::AdmitPartProgram(*text, *machine, verb.options);
+  if (!admission.faults.empty()) {
+    TellFaults(verb.program, admission.faults, output);
+    return absl::OkStatus();
+  }
+  output.Text("admitted: " + Fixed(admission.cutting_length_mm, 1) + " mm of cuts, " +
+                  std::to_string(admission.pierce_count) + " pierces, " + Fixed(admission.idle_length_mm, 1) +
+                  " mm idle",
+              Tone::kGood);
+  output.Json({{"admitted", true},
+               {"cutting_length_mm", admission.cutting_length_mm},
+               {"idle_length_mm", admission.idle_length_mm},
+               {"pierces", admission.pierce_count}});
+  return absl::OkStatus();
+}
+
+// The plan, or nothing after its faults were told.
+absl::StatusOr<PlannedProgram> PlanFile(const ProgramVerb& verb, Output& output,
+                                        MachineDescription& machine) {
+  const auto text = ReadTextFile(verb.program);
+  const auto read = ReadMachineFile(verb.machine);
+  if (!text.ok() || !read.ok()) {
+    return text.ok() ? read.status() : text.status();
+  }
+  machine = *read;
+  PlanOptions options = verb.options;
+  if (verb.start_from_s_mm >= 0.0) {
+    options.start_from_s_mm = verb.start_from_s_mm;
+  }
+  PlannedProgram planned = trajectory::PlanPartProgram(*text, machine, options, [&output](double ratio) {
+    output.Progress(ratio, "planning");
+    return true;
+  });
+  output.EndProgress();
+  return planned;
+}
+
+nlohmann::json SummaryJson(const PlannedProgram& p) {
+  nlohmann::json binding = nlohmann::json::array(), slow = nlohmann::json::array(),
+                 idle = nlohmann::json::array();
+  for (const auto& b : p.binding) {
+    binding.push_back({{"limit", std::string(FeedLimitName(b.limit))}, {"length_mm", b.length_mm}});
+  }
+  for (const auto& s : p.slow) {
+    slow.push_back({{"line", s.line},
+                    {"limit", std::string(FeedLimitName(s.limit))},
+                    {"from_s_mm", s.from_s_mm},
+                    {"to_s_mm", s.to_s_mm},
+                    {"programmed_mm_per_s", s.programmed_mm_per_s},
+                    {"lowest_mm_per_s", s.lowest_mm_per_s}});
+  }
+  for (const auto& i : p.idle) {
+    idle.push_back({{"line", i.line},
+                    {"law", std::string(i.law)},
+                    {"reason", std::string(i.reason)},
+                    {"duration_s", i.duration_s},
+                    {"start_speed_mm_per_s", i.start_speed_mm_per_s},
+                    {"peak_acceleration_mm_per_s2", i.peak_acceleration_mm_per_s2}});
+  }
+  return {{"plan_id", std::to_string(p.plan.id)},
+          {"duration_s", p.plan.duration_s},
+          {"gate_time_s", p.gate_time_s},
+          {"cutting_time_s", p.cutting_time_s},
+          {"length_mm", p.plan.length_mm},
+          {"cutting_length_mm", p.cutting_length_mm},
+          {"segments", p.plan.segments.size()},
+          {"gates", p.plan.gates.size()},
+          {"events", p.plan.events.size()},
+          {"compensated", p.plan.compensated},
+          {"contour_deviation_mm", p.contour_deviation_mm},
+          {"binding", binding},
+          {"slow", slow},
+          {"idle", idle}};
+}
+
+void TellSummary(const PlannedProgram& p, Output& output) {
+  output.Text("plan " + std::to_string(p.plan.id) + ": " + Fixed(p.plan.duration_s, 2) + " s moving, " +
+              Fixed(p.gate_time_s, 2) + " s at gates; cutting " + Fixed(p.cutting_length_mm, 1) + " mm in " +
+              Fixed(p.cutting_time_s, 2) + " s");
+  output.Text(std::to_string(p.plan.segments.size()) + " segments, " + std::to_string(p.plan.gates.size()) +
+              " gates, " + std::to_string(p.plan.events.size()) + " events; farthest from the contour " +
+              Fixed(p.contour_deviation_mm, 4) + " mm");
+  TextTable binding{{"what limits the feed", "mm"}, {}};
+  for (const auto& b : p.binding) {
+    binding.rows.push_back({std::string(FeedLimitName(b.limit)), Fixed(b.length_mm, 1)});
+  }
+  output.Table(binding);
+  TextTable slow{{"line", "from s mm", "to s mm", "programmed mm/s", "lowest mm/s", "because"}, {}};
+  for (std::size_t i = 0; i < p.slow.size() && i < 20; ++i) {
+    const auto& s = p.slow[i];
+    slow.rows.push_back({std::to_string(s.line), Fixed(s.from_s_mm, 1), Fixed(s.to_s_mm, 1),
+                         Fixed(s.programmed_mm_per_s, 1), Fixed(s.lowest_mm_per_s, 1),
+                         std::string(FeedLimitName(s.limit))});
+  }
+  if (!slow.rows.empty()) {
+    output.Text("where the programmed feed is not held (first " + std::to_string(slow.rows.size()) + " of " +
+                std::to_string(p.slow.size()) + "):");
+    output.Table(slow);
+  }
+}
+
+CsvTable SampleTable(const PlannedProgram& p, double step_s) {
+  CsvTable table({"tau_s", "s_mm", "x_W_mm", "y_W_mm", "vx_W_mm_per_s", "vy_W_mm_per_s", "ax_W_mm_per_s2",
+                  "ay_W_mm_per_s2", "actuator_1_mm", "actuator_2_mm", "actuator_1_mm_per_s",
+                  "actuator_2_mm_per_s", "cutting", "source_line"});
+  const auto count = static_cast<std::int64_t>(p.plan.duration_s / step_s + 1e-9);
+  for (std::int64_t i = 0; i <= count; ++i) {
+    const trajectory::FullSample s = SampleAt(p, static_cast<double>(i) * step_s);
+    table.AddRow(std::vector<double>{s.jet.tau_s, s.jet.s_mm, s.jet.x_W_mm, s.jet.y_W_mm, s.jet.vx_W_mm_per_s,
+                                     s.jet.vy_W_mm_per_s, s.jet.ax_W_mm_per_s2, s.jet.ay_W_mm_per_s2,
+                                     s.actuator_mm[0], s.actuator_mm[1], s.actuator_mm_per_s[0],
+                                     s.actuator_mm_per_s[1], s.jet.cutting ? 1.0 : 0.0,
+                                     static_cast<double>(s.jet.source_line)});
+  }
+  return table;
+}
+
+absl::Status PlanVerb(const ProgramVerb& verb, Output& output) {
+  MachineDescription machine;
+  const auto planned = PlanFile(verb, output, machine);
+  if (!planned.ok()) {
+    return planned.status();
+  }
+  if (!planned->faults.empty()) {
+    TellFaults(verb.program, planned->faults, output);
+    return absl::OkStatus();
+  }
+  if (!verb.out.empty()) {
+    if (const absl::Status status = WriteCsv(verb.out, SampleTable(*planned, verb.step_s)); !status.ok()) {
+      return status;
+    }
+  }
+  if (verb.out != "-") {
+    TellSummary(*planned, output);
+    output.Json(SummaryJson(*planned));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status DrawVerb(const ProgramVerb& verb, Output& output) {
+  MachineDescription machine;
+  const auto planned = PlanFile(verb, output, machine);
+  if (!planned.ok()) {
+    return planned.status();
+  }
+  if (!planned->faults.empty()) {
+    TellFaults(verb.program, planned->faults, output);
+    return absl::OkStatus();
+  }
+  return DrawPlan(*planned, machine, verb.colour, verb.out);
+}
+
+CLI::App* AddProgramVerb(CLI::App& noun, Output& output, const char* name, const char* what,
+                         const std::shared_ptr<ProgramVerb>& verb,
+                         absl::Status (*work)(const ProgramVerb&, Output&)) {
+  CLI::App* app = noun.add_subcommand(name, what);
+  app->add_option("program", verb->program, "G-code file; - is standard input")->required();
+  app->callback([verb, work, &output] { output.Finish(work(*verb, output)); });
+  return app;
+}
+
+void AddPlanOptions(CLI::App& app, const std::shared_ptr<ProgramVerb>& verb) {
+  app.add_option("--machine", verb->machine, "YAML file of the machine")->capture_default_str();
+  app.add_flag("--compensate", verb->options.compensate,
+               "elastic feed-forward, corner feed from predicted error");
+  app.add_option("--tolerance-mm", verb->options.tolerance_mm, "predicted error allowed with --compensate");
+  app.add_option("--feed-scale", verb->options.feed_scale, "factor on programmed feeds, above 0 to 1.2");
+  app.add_option("--start-from-s-mm", verb->start_from_s_mm, "resume: path length already cut");
+  app.add_option("--overlap-mm", verb->options.overlap_mm, "resume: backed up by this");
+}
+
+}  // namespace
+
+void AddTrajectoryVerbs(CLI::App& noun, Output& output) {
+  AddProgramVerb(noun, output, "canon", "the program's canonical operations, one a line",
+                 std::make_shared<ProgramVerb>(), Canon);
+  const auto check = std::make_shared<ProgramVerb>();
+  CLI::App* check_app =
+      AddProgramVerb(noun, output, "check", "whether a program can be cut; exit code 4 if not", check, Check);
+  check_app->add_option("--machine", check->machine, "YAML file of the machine")->capture_default_str();
+  const auto plan = std::make_shared<ProgramVerb>();
+  CLI::App* plan_app =
+      AddProgramVerb(noun, output, "plan",
+                     "plans a program: time, feed held, what limits it, points over time", plan, PlanVerb);
+  AddPlanOptions(*plan_app, plan);
+  plan_app->add_option("--out", plan->out, "CSV of points over time; - is standard output");
+  plan_app->add_option("--step-s", plan->step_s, "distance of the points")->check(CLI::Range(0.0001, 1.0));
+  const auto draw = std::make_shared<ProgramVerb>();
+  CLI::App* draw_app =
+      AddProgramVerb(noun, output, "draw", "toolpath and profiles over time as SVG or PNG", draw, DrawVerb);
+  AddPlanOptions(*draw_app, draw);
+  draw_app->add_option("--out", draw->out, "picture, .svg or .png")->required();
+  draw_app->add_option("--colour", draw->colour, "what the path's colour says")
+      ->check(CLI::IsMember({"speed", "limit"}))
+      ->capture_default_str();
+}
 
 }  // namespace lambdajet::cli
