@@ -240,7 +240,12 @@ CLI::App* AddProgramVerb(CLI::App& noun, Output& output, const char* name, const
                          absl::Status (*work)(const ProgramVerb&, Output&)) {
   CLI::App* app = noun.add_subcommand(name, what);
   app->add_option("program", verb->program, "G-code file; - is standard input")->required();
-  app->callback([verb, work, &output] { output.Finish(work(*verb, output)); });
+  app->callback([verb, work, &output] {
+    if (const absl::Status status = work(*verb, output);
+        !status.ok()) {  // faults have set their own exit code
+      output.Fail(status);
+    }
+  });
   return app;
 }
 

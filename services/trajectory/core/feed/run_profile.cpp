@@ -1,8 +1,8 @@
 #include "trajectory/core/feed/run_profile.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <cstdio>
 
 #include "trajectory/core/feed/reach.hpp"
 
@@ -17,7 +17,9 @@ constexpr double kCellOfRadius = 0.1;
 constexpr double kKinkNode_rad = 0.02;     // a kink above this has a node of its own
 constexpr double kTurningWindow_mm = 0.5;  // either side
 constexpr double kSmoothKink_rad = 0.35;   // kinks below this count as curvature of a polygon
+constexpr double kSamePlace_mm = 1e-3;
 constexpr int kFewestCells = 4;
+constexpr std::array<double, 3> kNearEnds_mm = {0.03, 0.1, 0.3};  // where speed changes fast over little way
 
 struct Kink {
   double offset_mm;
@@ -54,8 +56,22 @@ class NodeBuilder {
       return;
     }
     const int count = static_cast<int>(std::ceil(piece.length_mm / cell));
-    for (int k = 1; k < count && faults_.empty(); ++k) {
-      AddNode(i, piece.length_mm * k / count, piece.feed_mm_per_s, FeedLimit::kFeed);
+    const double step = piece.length_mm / count;
+    const bool fine = step > 2.0 * kNearEnds_mm.back();
+    for (std::size_t k = 0; fine && k < kNearEnds_mm.size(); ++k) {
+      AddInside(i, kNearEnds_mm[k]);
+    }
+    for (int k = 1; k < count; ++k) {
+      AddInside(i, step * k);
+    }
+    for (std::size_t k = kNearEnds_mm.size(); fine && k-- > 0;) {
+      AddInside(i, piece.length_mm - kNearEnds_mm[k]);
+    }
+  }
+
+  void AddInside(std::size_t i, double offset_mm) {
+    if (faults_.empty()) {
+      AddNode(i, offset_mm, run_.pieces[i].feed_mm_per_s, FeedLimit::kFeed);
     }
   }
 
@@ -81,7 +97,7 @@ class NodeBuilder {
     LimitKink(std::abs(angle), std::min(piece.tolerance_mm, next.tolerance_mm), speed, reason);
     const bool own = std::abs(angle) > kKinkNode_rad;
     if (own || here - nodes_.back().offset_mm >= shortest_) {
-      if (own && here - nodes_.back().offset_mm < 0.5 * shortest_ && nodes_.size() > 1) {
+      if (own && here - nodes_.back().offset_mm < kSamePlace_mm && nodes_.size() > 1) {
         LowerCap(nodes_.back(), speed, reason);
         return;
       }
@@ -114,8 +130,11 @@ class NodeBuilder {
     };
     const double sigma = std::sqrt(model_.filter.variance_s2());
     lower(0.9 * tolerance_mm / (model_.filter.kink_deviation_s() * change), FeedLimit::kCorner);
-    if (angle > 0.1) {
-      lower(1.8 * model_.path_acceleration_mm_per_s2 * sigma / change, FeedLimit::kCorner);
+    if (angle > kKinkNode_rad) {
+      // The kernel's peak is 0.4/sigma. Braking before and speeding up after the kink point the same way as its own change
+      // of velocity, by sin(angle/2) each.
+      const double room = 1.0 - std::sin(0.5 * angle);
+      lower(0.7 * room * model_.path_acceleration_mm_per_s2 * sigma / (0.4 * change), FeedLimit::kCorner);
     }
     const double lag = model_.options.compensate ? model_.machine.process.jet_lag_time_s : 0.0;
     if (lag > 0.0) {

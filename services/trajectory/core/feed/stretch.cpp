@@ -22,12 +22,14 @@ constexpr double kToleranceShare = 0.97;    // measured at knots, held between t
 constexpr double kCornerCosine = 0.95;      // kinks above 0.32 rad are corners
 constexpr double kCornerLook_mm = 2.0;
 constexpr double kSmallestDamping_s = 2e-5;
+constexpr double kLeastEase = 0.6;
 constexpr double kSettleTimes = 14.0;  // of the damping time: e^-14 of the lead is left
 
 struct PlannedRun {
   std::vector<ProfileNode> nodes;  // caps as found; x of the last pass
   std::vector<ProfileNode> solved;
-  std::vector<double> slow;  // one a node
+  std::vector<double> slow;  // of speed, one a node
+  std::vector<double> ease;  // of acceleration
   std::vector<FeedLimit> slow_reason;
   std::vector<double> node_time;
   double end_speed_mm_per_s = 0.0;
@@ -107,6 +109,7 @@ class StretchPlanner {
         PlannedRun& run = planned_[i].run;
         run.nodes = MakeRunNodes(model_, elements_[i], plan_.faults);
         run.slow.assign(run.nodes.size(), 1.0);
+        run.ease.assign(run.nodes.size(), 1.0);
         run.slow_reason.assign(run.nodes.size(), FeedLimit::kContourTolerance);
       }
     }
@@ -153,7 +156,7 @@ class StretchPlanner {
       const double f = run.slow[k];
       if (f < 1.0) {
         run.solved[k].speed_cap_mm_per_s = f * base_speed_[k];
-        run.solved[k].acceleration_mm_per_s2 *= f * f;
+        run.solved[k].acceleration_mm_per_s2 *= run.ease[k];
         run.solved[k].cap_reason = run.slow_reason[k];
       }
     }
@@ -663,6 +666,10 @@ class StretchPlanner {
       }
       if (worst.slow < 1.0) {
         e.run.slow[k] *= worst.slow;
+        // Too much acceleration is cured by less speed at the kink and a little less braking before it.
+        const double least =
+            worst.reason == FeedLimit::kPathAcceleration ? std::min(kLeastEase, e.run.ease[k]) : 0.0;
+        e.run.ease[k] = std::max(least, e.run.ease[k] * worst.slow * worst.slow);
         e.run.slow_reason[k] = worst.reason;
       }
     }

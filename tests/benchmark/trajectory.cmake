@@ -1,0 +1,4 @@
+add_executable(benchmark_trajectory trajectory_benchmark.cpp)
+lambdajet_own_code(benchmark_trajectory)
+target_include_directories(benchmark_trajectory PRIVATE ${CMAKE_SOURCE_DIR})
+target_link_libraries(benchmark_trajectory PRIVATE trajectory_core)
