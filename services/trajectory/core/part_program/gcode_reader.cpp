@@ -537,13 +537,13 @@ class Reader {
       motion_ = code(kMotion);
     }
     const bool axes_taken = code(kOnce) == 100 || code(kOnce) >= 920;
+    if (axes_taken && code(kMotion) != kNoCode && motion_ != 800) {
+      return Fault(column(kMotion), WordLength(column(kMotion)), "AXES_TAKEN_TWICE",
+                   "G10 and G92 take the axis words of their line; write the motion in the next line");
+    }
     const bool axes = !axes_taken && (block_.has('X') || block_.has('Y'));
     if (!axes && (code(kMotion) == kNoCode || motion_ == 800 || motion_ == 0 || motion_ == 10)) {
       return code(kMotion) == kNoCode || motion_ == 800 || code(kOnce) != kNoCode || NoTarget();
-    }
-    if (axes_taken && code(kMotion) != kNoCode) {
-      return Fault(column(kMotion), WordLength(column(kMotion)), "AXES_TAKEN_TWICE",
-                   "G10 and G92 take the axis words of their line; write the motion in the next line");
     }
     if (!CoordinatesFinite()) {
       return false;

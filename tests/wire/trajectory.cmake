@@ -1,0 +1,1 @@
+lambdajet_check(wire_trajectory LABELS wire SOURCES trajectory_wrong_programs_test.cpp DEPS trajectory_core)
