@@ -119,6 +119,8 @@ void VirtualCell::Step(double seconds) {
   }
 }
 
+void VirtualCell::Pause(double seconds) { now_ns_ += ToNs(seconds) / period_ns_ * period_ns_; }
+
 bool VirtualCell::StepUntil(const std::function<bool()>& condition, double limit_s) {
   const std::int64_t end_ns = now_ns_ + ToNs(limit_s);
   while (!condition()) {
@@ -198,6 +200,7 @@ void VirtualCell::StepDrive() {
   }
   LinkFigures link;
   link.round_trip_s = 2e-9 * static_cast<double>(options_.link.delay_ns + options_.link.jitter_ns);
+  link.clock_offset_s = clock_offset_s_;
   drive_->Step(now_ns_, {.commands = commands_to_drive_.arrived,
                          .peer = to_drive_.arrived,
                          .segments = segments_to_drive_.arrived,

@@ -72,6 +72,7 @@ class VirtualCell {
   CellRun Take();         // what has been recorded since Begin
   void Step();            // one control period of both modules
   void Step(double seconds);
+  void Pause(double seconds);  // the whole host stands still
   bool StepUntil(const std::function<bool()>& condition, double limit_s);
   void Send(Verb verb, std::uint32_t target, double value = 0.0, std::int64_t start_at_ns = 0);
   void SendTo(const ModuleCommand& command);
@@ -79,6 +80,7 @@ class VirtualCell {
   void set_link(const LinkQuality& quality) { options_.link = quality; }
   void set_drive_running(bool running) { drive_running_ = running; }  // false: silent, as if killed
   void set_main_motion_running(bool running) { main_motion_running_ = running; }
+  void set_clock_offset(double offset_s) { clock_offset_s_ = offset_s; }  // as the drive measures it
   void set_streaming(bool streaming) { streaming_ = streaming; }
   std::function<void(const drive::Setpoint&)> on_setpoint;  // each one written
 
@@ -87,6 +89,8 @@ class VirtualCell {
   const MainMotionState& main_motion() const { return main_motion_->state(); }
   drive::DriveCore& drive_core() { return *drive_; }
   main_motion::MainMotionCore& main_motion_core() { return *main_motion_; }
+  std::size_t switches_seen() const { return run_.switches.size(); }
+  const std::vector<simulated_plant::JetSwitch>& switches() const { return run_.switches; }
   simulated_plant::DrivePlant& drive_plant() { return *drive_plant_; }
   simulated_plant::MainMotionPlant& main_motion_plant() { return *main_motion_plant_; }
 
@@ -128,6 +132,7 @@ class VirtualCell {
   bool drive_running_ = true;
   bool main_motion_running_ = true;
   bool streaming_ = true;
+  double clock_offset_s_ = 0.0;
   bool recording_ = false;
 
   Plan plan_;

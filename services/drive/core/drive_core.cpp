@@ -442,7 +442,8 @@ void DriveCore::WatchRetrace() {
   if (!retracing_) {
     return;
   }
-  const PlayHead& head = play_.head();
+  // Where a stop commanded now would begin: set-points up to there are left as they are.
+  const PlayHead head = play_.At(now_ns_ + 2 * period_ns_);
   const RateLimits limits = RateLimitsNow();
   // Turns to a stop when the stopping distance reaches the mark; the head stands by itself at the oldest segment.
   PathClock stopping = head.clock;

@@ -1,0 +1,356 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <random>
+#include <vector>
+
+#include "simulated_plant/core/nominal_plant.hpp"
+#include "tests/support/demo_machine.hpp"
+#include "tests/support/hand_made_plan.hpp"
+#include "tests/support/virtual_cell.hpp"
+
+namespace lambdajet::tests {
+namespace {
+
+constexpr std::uint32_t kBoth = kTargetDrive | kTargetMainMotion;
+
+class Dice {
+ public:
+  explicit Dice(std::uint64_t seed) : engine_(seed) {}
+  double Between(double low, double high) {
+    return low + (high - low) * std::uniform_real_distribution<double>(0.0, 1.0)(engine_);
+  }
+  int Below(int n) { return std::uniform_int_distribution<int>(0, n - 1)(engine_); }
+
+ private:
+  std::mt19937_64 engine_;
+};
+
+Plan TwoCircles(const MachineDescription& machine, double speed_mm_per_s = 100.0) {
+  HandMadePlan plan(machine);
+  plan.From(300, 300);
+  for (int i = 0; i < 2; ++i) {
+    plan.LineTo(360 + 90 * i, 300, 250);
+    plan.Gate(GateKind::kPierce, 0.3);
+    plan.CircleAround(330 + 90 * i, 300, speed_mm_per_s);
+    plan.Event(ProcessAction::kAbrasiveOff);
+    plan.Event(ProcessAction::kJetOff);
+  }
+  plan.LineTo(300, 300, 250);
+  return plan.Finish(77);
+}
+
+// How far a set-point lies from the plan's curve q(tau), looked for near where the last one was.
+class CurveDistance {
+ public:
+  explicit CurveDistance(const Plan& plan) : plan_(plan) {}
+
+  double operator()(const std::array<double, kActuatorCount>& q) {
+    const double near = Near(q);
+    if (near <= 1e-9) {
+      return near;
+    }
+    // Lost sight of it (a corner, a loop of the path): looks along the whole plan.
+    double best = near;
+    for (double tau = 0.0; tau <= plan_.duration_s; tau += 0.02) {
+      tau_ = tau;
+      if (At(tau, q) < 25.0) {
+        best = std::min(best, Near(q));
+      }
+    }
+    return best;
+  }
+
+ private:
+  double Near(const std::array<double, kActuatorCount>& q) {
+    double best = At(tau_, q);
+    for (double step = 0.01; step > 1e-13; step *= 0.5) {
+      for (bool better = true; better;) {
+        better = false;
+        for (const double tau : {tau_ - step, tau_ + step}) {
+          const double distance = At(std::clamp(tau, 0.0, plan_.duration_s), q);
+          if (distance < best) {
+            best = distance;
+            tau_ = std::clamp(tau, 0.0, plan_.duration_s);
+            better = true;
+          }
+        }
+      }
+    }
+    return std::sqrt(best);
+  }
+
+  double At(double tau, const std::array<double, kActuatorCount>& q) {
+    while (segment_ > 0 && tau < plan_.segments[segment_].start_s) {
+      --segment_;
+    }
+    while (segment_ + 1 < plan_.segments.size() && tau >= plan_.segments[segment_ + 1].start_s) {
+      ++segment_;
+    }
+    const Segment& s = plan_.segments[segment_];
+    const double t = tau - s.start_s;
+    return std::pow(s.q_mm[0].value(t) - q[0], 2) + std::pow(s.q_mm[1].value(t) - q[1], 2);
+  }
+
+  const Plan& plan_;
+  std::size_t segment_ = 0;
+  double tau_ = 0.0;
+};
+
+// A person's restless hand on hold, resume, override and retrace.
+void Meddle(VirtualCell& cell, Dice& dice) {
+  switch (dice.Below(8)) {
+    case 0:
+    case 1:
+      cell.Send(Verb::kHold, kBoth);
+      break;
+    case 2:
+      cell.Send(Verb::kOverride, kBoth, dice.Between(0.2, 1.2));
+      break;
+    case 3:
+      cell.Send(Verb::kRetrace, kBoth, dice.Between(0.5, 30.0));
+      break;
+    default:
+      cell.Send(Verb::kResume, kBoth);
+      break;
+  }
+}
+
+TEST(PathLaw, ContourKeepsItsShapeUnderHoldsOverridesAndRetraces) {
+  const MachineDescription machine = DemoMachine();
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    Dice dice(seed);
+    CellOptions options;
+    options.seed = seed;
+    VirtualCell cell(machine, simulated_plant::NominalPlant(machine), options);
+    const Plan plan = TwoCircles(machine);
+    cell.Begin(plan);
+    CurveDistance distance(plan);
+    double worst_mm = 0.0;
+    double worst_acceleration = 0.0;
+    std::optional<drive::Setpoint> last, before;
+    std::int64_t written_until = 0;
+    std::uint64_t checked = 0;
+    std::vector<drive::Setpoint> queue;
+    cell.on_setpoint = [&](const drive::Setpoint& s) {
+      // What is written later for the same instant takes the place of what was written first.
+      while (!queue.empty() && queue.back().execute_at_ns >= s.execute_at_ns) {
+        queue.pop_back();
+      }
+      queue.push_back(s);
+    };
+    const auto drain = [&] {
+      std::size_t played = 0;
+      for (; played < queue.size() && queue[played].execute_at_ns <= cell.now_ns(); ++played) {
+        const drive::Setpoint& s = queue[played];
+        EXPECT_GT(s.execute_at_ns, written_until);
+        written_until = s.execute_at_ns;
+        if (++checked % 7 == 0) {
+          worst_mm = std::max(worst_mm, distance(s.position_mm));
+        }
+        if (last && before && s.execute_at_ns - last->execute_at_ns == 1'000'000) {
+          for (std::size_t i = 0; i < 2; ++i) {
+            worst_acceleration = std::max(
+                worst_acceleration,
+                std::abs(s.position_mm[i] - 2 * last->position_mm[i] + before->position_mm[i]) * 1e6);
+          }
+        }
+        before = last;
+        last = s;
+      }
+      queue.erase(queue.begin(), queue.begin() + static_cast<std::ptrdiff_t>(played));
+    };
+    for (int i = 0; i < 60000 && !cell.Finished(); ++i) {
+      if (i % 400 == 399) {
+        Meddle(cell, dice);
+      }
+      if (i % 4000 == 3999) {
+        cell.Send(Verb::kResume, kBoth);
+      }
+      cell.Step();
+      drain();
+    }
+    const ModuleMode ended = cell.drive().mode;
+    EXPECT_TRUE(ended == ModuleMode::kComplete || ended == ModuleMode::kRunning ||
+                ended == ModuleMode::kHeld || ended == ModuleMode::kHolding || ended == ModuleMode::kResuming)
+        << Name(ended) << " " << Name(cell.drive().reason);
+    EXPECT_GT(checked, 5000u);
+    EXPECT_LE(worst_mm, 1e-9) << "seed " << seed;
+    EXPECT_LE(worst_acceleration, machine.actuators[0].acceleration_mm_per_s2) << "seed " << seed;
+    EXPECT_EQ(cell.drive_core().setpoints_late(), 0u);
+  }
+}
+
+TEST(JetLaw, IsNeverOnLongerThanTheDeadlineWithoutTheDrive) {
+  const MachineDescription machine = DemoMachine();
+  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+    Dice dice(seed);
+    CellOptions options;
+    options.seed = seed;
+    VirtualCell cell(machine, simulated_plant::RandomPlant(machine, seed), options);
+    cell.Begin(TwoCircles(machine, 40.0));
+    ASSERT_TRUE(cell.StepUntil([&] { return cell.main_motion().jet_on; }, 20.0));
+    cell.Step(dice.Between(0.05, 3.0));
+    const bool silent_drive = dice.Below(2) == 0;
+    if (silent_drive) {
+      cell.set_drive_running(false);
+    } else {
+      cell.set_link({.loss = 1.0});
+    }
+    const std::int64_t lost_ns = cell.now_ns();
+    cell.Step(0.3);
+    EXPECT_FALSE(cell.main_motion().jet_on);
+    EXPECT_FALSE(cell.main_motion_plant().jet_on());
+    for (const auto& change : cell.switches()) {
+      if (change.time_ns > lost_ns && !change.on) {
+        const double off_s = 1e-9 * static_cast<double>(change.time_ns - lost_ns);
+        EXPECT_LE(off_s,
+                  options.main_motion.drive_deadline_s + 1.5 * machine.process.jet_off_delay_s + 0.004);
+      }
+      EXPECT_FALSE(change.time_ns > lost_ns && change.on) << "water came on without a drive";
+    }
+    EXPECT_LT(cell.main_motion().pump_pressure_mpa, options.main_motion.pump_pressure_mpa);
+    // The link alone is back: nothing goes on by itself.
+    cell.set_drive_running(true);
+    cell.set_link({});
+    cell.Step(1.0);
+    EXPECT_FALSE(cell.main_motion_plant().jet_on());
+    EXPECT_NE(cell.drive().mode, ModuleMode::kRunning);
+  }
+}
+
+TEST(JetLaw, CutsNothingWhereThePlanDoesNot) {
+  // Water only between a pierce and its jet-off, whatever holds come between: never while the path runs without it.
+  const MachineDescription machine = DemoMachine();
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    Dice dice(seed);
+    VirtualCell cell(machine, simulated_plant::NominalPlant(machine), {});
+    const Plan plan = TwoCircles(machine);
+    cell.Begin(plan);
+    const double slack_mm = 0.5;
+    for (int i = 0; i < 60000 && !cell.Finished(); ++i) {
+      if (i % 500 == 499) {
+        Meddle(cell, dice);
+      }
+      if (i % 2500 == 2499) {
+        cell.Send(Verb::kResume, kBoth);
+      }
+      cell.Step();
+      const double s = cell.drive().s_mm;
+      if (cell.main_motion_plant().jet_on()) {
+        bool inside = false;
+        for (std::size_t g = 0; g < plan.gates.size(); ++g) {
+          inside =
+              inside || (s >= plan.gates[g].s_mm - slack_mm && s <= plan.events[2 * g + 1].s_mm + slack_mm);
+        }
+        ASSERT_TRUE(inside) << "water at s " << s << ", seed " << seed;
+      } else if (cell.drive().s_rate_mm_per_s > 5.0 && cell.drive().mode == ModuleMode::kRunning) {
+        for (std::size_t g = 0; g < plan.gates.size(); ++g) {
+          ASSERT_FALSE(s > plan.gates[g].s_mm + slack_mm && s < plan.events[2 * g + 1].s_mm - slack_mm)
+              << "no water at s " << s << ", seed " << seed;
+        }
+      }
+    }
+  }
+}
+
+TEST(LinkLaw, PlansSurviveLossDelayAndDuplication) {
+  const MachineDescription machine = DemoMachine();
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    CellOptions options;
+    options.seed = seed;
+    options.link = {.delay_ns = 300'000, .jitter_ns = 3'000'000, .loss = 0.2, .duplicate = 0.2};
+    options.main_motion.drive_deadline_s = 0.03;
+    options.drive.peer_deadline_s = 0.06;
+    options.drive.clock_offset_limit_s = 0.01;
+    VirtualCell cell(machine, simulated_plant::NominalPlant(machine), options);
+    const CellRun run = cell.Run(TwoCircles(machine));
+    ASSERT_TRUE(run.complete) << Name(cell.drive().mode) << " " << Name(cell.drive().reason) << " / "
+                              << Name(cell.main_motion().mode) << " " << Name(cell.main_motion().reason);
+    EXPECT_EQ(run.process_records.size(), 4u) << "each event once";
+    EXPECT_EQ(run.switches.size(), 4u);
+    EXPECT_GT(cell.drive().dropped_samples, 0u);
+    EXPECT_GT(cell.main_motion().dropped_samples, 0u);
+    EXPECT_EQ(cell.drive_core().setpoints_late(), 0u);
+  }
+}
+
+TEST(BufferLaw, AStarvingDriveHoldsBeforeTheEndAndGoesOnByItself) {
+  const MachineDescription machine = DemoMachine();
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+    Dice dice(seed);
+    VirtualCell cell(machine, simulated_plant::NominalPlant(machine), {});
+    const Plan plan = TwoCircles(machine, 30.0);
+    cell.Begin(plan);
+    ASSERT_TRUE(cell.StepUntil([&] { return cell.drive().s_rate_mm_per_s > 29.0; }, 20.0));
+    cell.Step(dice.Between(0.0, 3.0));
+    cell.set_streaming(false);
+    ASSERT_TRUE(cell.StepUntil([&] { return cell.drive().mode == ModuleMode::kHeld; }, 20.0));
+    EXPECT_EQ(cell.drive().reason, ModuleReason::kStarved);
+    EXPECT_GT(cell.drive().buffered_s, 0.0);
+    cell.Step(dice.Between(0.1, 4.0));
+    EXPECT_EQ(cell.drive().mode, ModuleMode::kHeld);
+    cell.set_streaming(true);
+    ASSERT_TRUE(cell.StepUntil([&] { return cell.Finished(); }, 60.0));
+    EXPECT_EQ(cell.drive().mode, ModuleMode::kComplete);
+  }
+}
+
+TEST(BufferLaw, NeverHoldsMoreThanItsLimit) {
+  const MachineDescription machine = DemoMachine();
+  VirtualCell cell(machine, simulated_plant::NominalPlant(machine), {});
+  cell.Begin(TwoCircles(machine, 10.0));
+  for (int i = 0; i < 5000; ++i) {
+    cell.Step();
+    ASSERT_LE(cell.drive().buffered_s, 4.1);
+  }
+}
+
+TEST(ClockLaw, APauseOfTheWholeHostIsNoLostPeer) {
+  const MachineDescription machine = DemoMachine();
+  for (const double pause_s : {0.005, 0.015, 0.03, 0.045}) {
+    CellOptions options;
+    options.drive.overruns_allowed = 50;
+    options.main_motion.overruns_allowed = 50;
+    VirtualCell cell(machine, simulated_plant::NominalPlant(machine), options);
+    cell.Begin(TwoCircles(machine));
+    ASSERT_TRUE(cell.StepUntil(
+        [&] { return cell.drive().s_rate_mm_per_s > 90.0 && cell.main_motion().jet_on; }, 20.0));
+    cell.Pause(pause_s);
+    cell.Step(0.1);
+    EXPECT_EQ(cell.drive().mode, ModuleMode::kRunning) << pause_s << " " << Name(cell.drive().reason);
+    EXPECT_TRUE(cell.main_motion().jet_on) << pause_s << " " << Name(cell.main_motion().reason);
+    const CellRun run = cell.Take();
+    // The servo had its set-points: the path did not notice.
+    for (const DriveState& state : run.drive_states) {
+      EXPECT_LE(std::abs(state.following_error_mm[0]), 0.15);
+    }
+  }
+}
+
+TEST(RepeatLaw, TheSameSeedGivesTheSameRunBitByBit) {
+  const MachineDescription machine = DemoMachine();
+  const auto run = [&] {
+    CellOptions options;
+    options.seed = 5;
+    options.link.loss = 0.05;
+    VirtualCell cell(machine, simulated_plant::RandomPlant(machine, 3), options);
+    return cell.Run(TwoCircles(machine));
+  };
+  const CellRun a = run();
+  const CellRun b = run();
+  ASSERT_EQ(a.drive_truth.size(), b.drive_truth.size());
+  for (std::size_t i = 0; i < a.drive_truth.size(); ++i) {
+    ASSERT_EQ(a.drive_truth[i].X_DW.x_mm, b.drive_truth[i].X_DW.x_mm);
+  }
+  ASSERT_EQ(a.jet_truth.size(), b.jet_truth.size());
+  ASSERT_EQ(a.process_records.size(), b.process_records.size());
+  for (std::size_t i = 0; i < a.process_records.size(); ++i) {
+    EXPECT_EQ(a.process_records[i].deviation_mm, b.process_records[i].deviation_mm);
+  }
+}
+
+}  // namespace
+}  // namespace lambdajet::tests

@@ -1,0 +1,396 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <new>
+#include <vector>
+
+#include "simulated_plant/core/nominal_plant.hpp"
+#include "simulated_plant/core/true_mechanism.hpp"
+#include "tests/support/demo_machine.hpp"
+#include "tests/support/hand_made_plan.hpp"
+#include "tests/support/virtual_cell.hpp"
+
+namespace {
+std::atomic<std::uint64_t> allocations = 0;
+}
+
+void* operator new(std::size_t size) {
+  allocations.fetch_add(1, std::memory_order_relaxed);
+  if (void* memory = std::malloc(size)) {
+    return memory;
+  }
+  std::abort();
+}
+void operator delete(void* memory) noexcept { std::free(memory); }
+void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+
+namespace lambdajet::tests {
+namespace {
+
+constexpr std::uint32_t kBoth = kTargetDrive | kTargetMainMotion;
+
+Plan Circle(const MachineDescription& machine, double speed_mm_per_s = 40.0, std::uint64_t id = 5) {
+  HandMadePlan plan(machine);
+  plan.From(300, 300);
+  plan.LineTo(340, 300, 250);
+  plan.Gate(GateKind::kPierce, 0.3);
+  plan.CircleAround(310, 300, speed_mm_per_s);
+  plan.Event(ProcessAction::kAbrasiveOff);
+  plan.Event(ProcessAction::kJetOff);
+  plan.LineTo(300, 300, 250);
+  return plan.Finish(id);
+}
+
+class Modules : public testing::Test {
+ protected:
+  explicit Modules(const CellOptions& options = {})
+      : machine_(DemoMachine()), cell_(machine_, simulated_plant::NominalPlant(machine_), options) {}
+
+  void Cut() {
+    cell_.Begin(Circle(machine_));
+    ASSERT_TRUE(cell_.StepUntil(
+        [&] { return cell_.main_motion().jet_on && cell_.drive().s_rate_mm_per_s > 39.0; }, 20.0));
+  }
+  bool Drive(ModuleMode mode, double within_s = 5.0) {
+    return cell_.StepUntil([&] { return cell_.drive().mode == mode; }, within_s);
+  }
+  CommandReceipt Told(Verb verb, double value = 0.0, std::int64_t start_at_ns = 0) {
+    cell_.Send(verb, kBoth, value, start_at_ns);
+    cell_.Step(0.01);
+    return cell_.drive().command;
+  }
+
+  MachineDescription machine_;
+  VirtualCell cell_;
+};
+
+TEST_F(Modules, StartSafeAndRefuseMotionUntilReferenced) {
+  cell_.Step(0.05);
+  EXPECT_EQ(cell_.drive().mode, ModuleMode::kSafe);
+  EXPECT_EQ(cell_.drive().reason, ModuleReason::kRestarted);
+  EXPECT_EQ(cell_.main_motion().mode, ModuleMode::kSafe);
+  for (const Verb verb : {Verb::kArm, Verb::kStart, Verb::kHold, Verb::kResume, Verb::kRetrace}) {
+    EXPECT_EQ(Told(verb, 1.0).answer, CommandAnswer::kRefused) << Name(verb);
+    EXPECT_EQ(cell_.drive().mode, ModuleMode::kSafe);
+  }
+  EXPECT_EQ(Told(Verb::kArm).reason, ModuleReason::kNotReferenced);
+  EXPECT_EQ(Told(Verb::kJog, 1.0).reason, ModuleReason::kWrongMode);
+  EXPECT_EQ(Told(Verb::kHome).answer, CommandAnswer::kDone);
+  EXPECT_EQ(cell_.drive().mode, ModuleMode::kInitialising);
+  ASSERT_TRUE(Drive(ModuleMode::kReady));
+  EXPECT_TRUE(cell_.drive().referenced);
+}
+
+TEST_F(Modules, HoldAndResumePierceAgainWithAnOverlap) {
+  Cut();
+  Told(Verb::kHold);
+  ASSERT_TRUE(Drive(ModuleMode::kHeld));
+  const double held_mm = cell_.drive().s_mm;
+  cell_.Step(0.2);
+  EXPECT_FALSE(cell_.main_motion().jet_on) << "a standing jet spoils the contour";
+  EXPECT_EQ(cell_.drive().s_mm, held_mm);
+  Told(Verb::kResume);
+  ASSERT_TRUE(Drive(ModuleMode::kResuming));
+  EXPECT_NEAR(cell_.drive().s_mm, held_mm - 1.0, 0.15) << "backed up by the overlap";
+  ASSERT_TRUE(Drive(ModuleMode::kRunning));
+  EXPECT_TRUE(cell_.main_motion().jet_on);
+  ASSERT_TRUE(Drive(ModuleMode::kComplete, 20.0));
+  EXPECT_EQ(cell_.switches_seen(), 4u);
+}
+
+TEST_F(Modules, OverrideChangesTheRateAndIsRefusedOutsideItsRange) {
+  Cut();
+  EXPECT_EQ(Told(Verb::kOverride, 0.5).answer, CommandAnswer::kDone);
+  ASSERT_TRUE(cell_.StepUntil([&] { return cell_.drive().tau_rate == 0.5; }, 2.0));
+  EXPECT_NEAR(cell_.drive().s_rate_mm_per_s, 20.0, 1.0);
+  EXPECT_EQ(Told(Verb::kOverride, 1.2).answer, CommandAnswer::kDone);
+  ASSERT_TRUE(cell_.StepUntil([&] { return cell_.drive().tau_rate == 1.2; }, 2.0));
+  for (const double bad : {-0.1, 1.3, std::nan("")}) {
+    EXPECT_EQ(Told(Verb::kOverride, bad).answer, CommandAnswer::kRefused);
+  }
+  EXPECT_EQ(cell_.drive().feed_override, 1.2);
+  EXPECT_EQ(Told(Verb::kOverride, 0.0).answer, CommandAnswer::kDone);
+  ASSERT_TRUE(cell_.StepUntil([&] { return cell_.drive().tau_rate == 0.0; }, 2.0));
+}
+
+TEST_F(Modules, RetraceGoesBackByTheDistance) {
+  Cut();
+  cell_.Step(1.0);
+  Told(Verb::kHold);
+  ASSERT_TRUE(Drive(ModuleMode::kHeld));
+  const double held_mm = cell_.drive().s_mm;
+  EXPECT_EQ(Told(Verb::kRetrace, 12.0).answer, CommandAnswer::kDone);
+  EXPECT_EQ(cell_.drive().mode, ModuleMode::kHolding);
+  ASSERT_TRUE(Drive(ModuleMode::kHeld));
+  EXPECT_NEAR(cell_.drive().s_mm, held_mm - 12.0, 0.3);
+  EXPECT_EQ(Told(Verb::kRetrace, -1.0).answer, CommandAnswer::kRefused);
+}
+
+TEST_F(Modules, StopIsLatchedAndResetMovesNothing) {
+  Cut();
+  EXPECT_EQ(Told(Verb::kStop).answer, CommandAnswer::kDone);
+  ASSERT_TRUE(Drive(ModuleMode::kStopped));
+  cell_.Step(0.2);
+  EXPECT_EQ(cell_.main_motion().mode, ModuleMode::kStopped);
+  EXPECT_FALSE(cell_.main_motion().jet_on);
+  for (const Verb verb : {Verb::kStart, Verb::kResume, Verb::kArm, Verb::kHome, Verb::kLoad}) {
+    EXPECT_EQ(Told(verb).answer, CommandAnswer::kRefused) << Name(verb);
+  }
+  const auto stood = cell_.drive().actuator_position_mm;
+  EXPECT_EQ(Told(Verb::kReset).answer, CommandAnswer::kDone);
+  EXPECT_EQ(cell_.drive().mode, ModuleMode::kReady);
+  cell_.Step(1.0);
+  EXPECT_NEAR(cell_.drive().actuator_position_mm[0], stood[0], 1e-3);
+  EXPECT_NEAR(cell_.drive().actuator_position_mm[1], stood[1], 1e-3);
+}
+
+TEST_F(Modules, APlanThatWasStoppedGoesOnWhereItStood) {
+  Cut();
+  Told(Verb::kStop);
+  ASSERT_TRUE(Drive(ModuleMode::kStopped));
+  const double stopped_mm = cell_.drive().s_mm;
+  Told(Verb::kReset);
+  EXPECT_EQ(Told(Verb::kArm).answer, CommandAnswer::kDone);
+  ASSERT_TRUE(cell_.StepUntil(
+      [&] {
+        return cell_.drive().mode == ModuleMode::kArmed && cell_.main_motion().mode == ModuleMode::kArmed;
+      },
+      10.0));
+  cell_.Step(0.01);  // the drive, too, must have heard that main motion is armed
+  EXPECT_EQ(Told(Verb::kStart, 0.0, cell_.now_ns() + 50'000'000).answer, CommandAnswer::kDone)
+      << Name(cell_.drive().command.reason) << " main motion " << Name(cell_.main_motion().mode);
+  ASSERT_TRUE(Drive(ModuleMode::kResuming));
+  EXPECT_NEAR(cell_.drive().s_mm, stopped_mm, 0.05);
+  ASSERT_TRUE(Drive(ModuleMode::kRunning));
+  EXPECT_TRUE(cell_.main_motion().jet_on) << "pierced again";
+  EXPECT_TRUE(Drive(ModuleMode::kComplete, 20.0));
+}
+
+TEST_F(Modules, LostMainMotionHoldsThenStops) {
+  Cut();
+  const std::int64_t lost_ns = cell_.now_ns();
+  cell_.set_main_motion_running(false);
+  ASSERT_TRUE(Drive(ModuleMode::kHolding));
+  EXPECT_EQ(cell_.drive().reason, ModuleReason::kPeerLost);
+  EXPECT_LE(cell_.now_ns() - lost_ns, 26'000'000);
+  EXPECT_GE(cell_.now_ns() - lost_ns, 16'000'000);
+  ASSERT_TRUE(Drive(ModuleMode::kHeld));
+  EXPECT_EQ(Told(Verb::kResume).reason, ModuleReason::kPeerLost);
+  ASSERT_TRUE(Drive(ModuleMode::kStopped));
+  EXPECT_EQ(cell_.drive().reason, ModuleReason::kPeerLost);
+  EXPECT_NEAR(1e-9 * static_cast<double>(cell_.now_ns() - lost_ns), 2.0, 0.1);
+}
+
+TEST_F(Modules, AShortSilenceOfTheDriveTakesTheJetOffAndHoldsThePath) {
+  Cut();
+  cell_.set_link({.delay_ns = 25'000'000, .jitter_ns = 0});  // late news is no news
+  ASSERT_TRUE(Drive(ModuleMode::kHeld));
+  cell_.Step(0.1);
+  EXPECT_FALSE(cell_.main_motion().jet_on);
+  cell_.set_link({});
+  cell_.Step(0.2);
+  EXPECT_EQ(cell_.drive().mode, ModuleMode::kHeld) << "a person decides";
+  EXPECT_EQ(Told(Verb::kResume).answer, CommandAnswer::kDone);
+  EXPECT_TRUE(Drive(ModuleMode::kComplete, 30.0));
+  EXPECT_EQ(cell_.switches_seen(), 4u);
+}
+
+TEST_F(Modules, RefuseToCutWithClocksApart) {
+  cell_.set_clock_offset(0.0010);
+  cell_.Begin(Circle(machine_));
+  EXPECT_NE(cell_.drive().mode, ModuleMode::kArmed);
+  EXPECT_EQ(Told(Verb::kArm).reason, ModuleReason::kClockOffset);
+  cell_.set_clock_offset(0.00005);
+  cell_.Step(0.01);
+  EXPECT_EQ(Told(Verb::kArm).answer, CommandAnswer::kDone);
+}
+
+TEST_F(Modules, RefuseStaleCommandsWrongPlansAndLeftWriters) {
+  cell_.Begin(Circle(machine_));
+  ASSERT_TRUE(cell_.StepUntil([&] { return cell_.drive().mode == ModuleMode::kComplete; }, 30.0));
+  EXPECT_EQ(Told(Verb::kLoad).answer, CommandAnswer::kDone);
+  ModuleCommand other;
+  other.header = {901, 1, cell_.now_ns()};
+  other.target = kBoth;
+  other.verb = Verb::kArm;
+  other.plan = 999;
+  cell_.SendTo(other);
+  cell_.Step(0.01);
+  EXPECT_EQ(cell_.drive().command.reason, ModuleReason::kWrongPlan);
+  EXPECT_EQ(cell_.main_motion().command.reason, ModuleReason::kWrongPlan);
+  ModuleCommand old = other;
+  old.header = {901, 2, cell_.now_ns() - 3'000'000'000};
+  old.verb = Verb::kUnload;
+  cell_.SendTo(old);
+  cell_.Step(0.01);
+  EXPECT_EQ(cell_.drive().command.reason, ModuleReason::kStaleCommand);
+  EXPECT_NE(cell_.drive().plan, 0u);
+  // The writer that was left speaks again: neither obeyed nor answered.
+  cell_.Send(Verb::kUnload, kBoth);
+  cell_.Step(0.01);
+  EXPECT_EQ(cell_.drive().command.session, 901u);
+  EXPECT_NE(cell_.drive().plan, 0u);
+}
+
+TEST_F(Modules, StartAtTheInstantTheyWereTold) {
+  const Plan plan = Circle(machine_);
+  std::int64_t first_motion_ns = 0;
+  std::array<double, kActuatorCount> start{plan.segments[0].q_mm[0].c[0], plan.segments[0].q_mm[1].c[0]};
+  cell_.Begin(plan);
+  const std::int64_t begun_ns = cell_.now_ns();
+  cell_.on_setpoint = [&](const drive::Setpoint& s) {
+    if (first_motion_ns == 0 && std::abs(s.position_mm[0] - start[0]) > 1e-12) {
+      first_motion_ns = s.execute_at_ns;
+    }
+  };
+  cell_.Step(0.2);
+  EXPECT_GE(first_motion_ns, begun_ns + 50'000'000);
+  EXPECT_LE(first_motion_ns, begun_ns + 52'000'000);
+}
+
+TEST_F(Modules, TwoWritersAreAFault) {
+  Cut();
+  // A second main motion speaks, then the first again.
+  MainMotionState second = cell_.main_motion();
+  second.header.session = 4711;
+  drive::DriveCore& core = cell_.drive_core();
+  const auto say = [&](const MainMotionState& state) {
+    core.Step(cell_.now_ns() + 100'000,
+              {.commands = {}, .peer = {&state, 1}, .segments = {}, .process = {}, .link = {}});
+  };
+  second.header.time_ns = cell_.now_ns();
+  say(second);
+  cell_.Step(0.02);
+  EXPECT_EQ(cell_.drive().mode, ModuleMode::kFault);
+  EXPECT_EQ(cell_.drive().reason, ModuleReason::kTwoWriters);
+}
+
+TEST_F(Modules, FollowingErrorTrips) {
+  Cut();
+  cell_.drive_plant().Inject({simulated_plant::FaultKind::kStall, 0, 0.0, 10.0, 0.0});
+  ASSERT_TRUE(Drive(ModuleMode::kFault, 2.0));
+  EXPECT_EQ(cell_.drive().reason, ModuleReason::kFollowingError);
+  cell_.Step(0.2);
+  EXPECT_FALSE(cell_.main_motion().jet_on);
+  EXPECT_EQ(cell_.main_motion().reason, ModuleReason::kPeerStopped);
+}
+
+TEST_F(Modules, LostPressureTakesTheJetOffAndHoldsTheDrive) {
+  Cut();
+  cell_.main_motion_plant().Inject({simulated_plant::FaultKind::kPressureLoss, 0, 0.0, 10.0, 0.0});
+  ASSERT_TRUE(Drive(ModuleMode::kHeld, 5.0));
+  EXPECT_EQ(cell_.drive().reason, ModuleReason::kPeerStopped);
+  EXPECT_EQ(cell_.main_motion().mode, ModuleMode::kFault);
+  EXPECT_EQ(cell_.main_motion().reason, ModuleReason::kPressureLost);
+  EXPECT_FALSE(cell_.main_motion().jet_on);
+}
+
+TEST_F(Modules, DwellsAndStopsOpenByThemselvesAndByThePerson) {
+  HandMadePlan plan(machine_);
+  plan.From(300, 300);
+  plan.LineTo(340, 300, 250);
+  plan.Gate(GateKind::kDwell, 0.5);
+  plan.LineTo(380, 300, 250);
+  plan.Gate(GateKind::kStop, 0.0);
+  plan.LineTo(400, 300, 250);
+  cell_.Begin(plan.Finish(8));
+  ASSERT_TRUE(cell_.StepUntil([&] { return cell_.drive().gate_waiting == 1; }, 5.0));
+  const std::int64_t waiting_ns = cell_.now_ns();
+  ASSERT_TRUE(cell_.StepUntil([&] { return cell_.drive().gate_waiting == 0; }, 5.0));
+  EXPECT_NEAR(1e-9 * static_cast<double>(cell_.now_ns() - waiting_ns), 0.5, 0.01);
+  ASSERT_TRUE(cell_.StepUntil([&] { return cell_.drive().gate_waiting == 2; }, 5.0));
+  cell_.Step(3.0);
+  EXPECT_EQ(cell_.drive().gate_waiting, 2u);
+  EXPECT_EQ(Told(Verb::kResume).answer, CommandAnswer::kDone);
+  EXPECT_TRUE(Drive(ModuleMode::kComplete));
+}
+
+TEST_F(Modules, TrackingTakesAPictureEveryTenMilliseconds) {
+  HandMadePlan plan(machine_);
+  plan.From(270, 300);
+  plan.EventAt(ProcessAction::kCameraTrackOn, 5.0, 13);
+  plan.LineTo(290, 300, 20);
+  plan.EventAt(ProcessAction::kCameraTrackOff, 15.0);
+  const CellRun run = cell_.Run(plan.Finish(9));
+  ASSERT_TRUE(run.complete);
+  ASSERT_GT(run.measurements.size(), 40u);
+  for (std::size_t i = 0; i < run.measurements.size(); ++i) {
+    const Measurement& m = run.measurements[i];
+    EXPECT_TRUE(m.seen);
+    EXPECT_EQ(m.mark, 13);
+    EXPECT_EQ(m.gate, 0u);
+    // The camera sees the mark where the sliders of that instant put it.
+    const auto p_DE =
+        simulated_plant::TruePoint(simulated_plant::NominalPlant(machine_), m.actuator_position_mm);
+    ASSERT_TRUE(p_DE);
+    const Eigen::Vector2d p_C = *p_DE + machine_.X_EW() * Eigen::Vector2d(400, 300) -
+                                machine_.X_DJ().translation_mm() - machine_.p_JC_mm();
+    // The sheet still rings at first: 0.4 mm from the start, falling by a factor e in a third of a second.
+    const double ringing_mm = 0.02 + 0.4 * std::exp(-0.03 * static_cast<double>(i));
+    EXPECT_NEAR(m.x_C_mm, p_C.x(), ringing_mm);
+    EXPECT_NEAR(m.y_C_mm, p_C.y(), ringing_mm);
+    if (i > 0) {
+      EXPECT_NEAR(1e-6 * static_cast<double>(m.exposure_ns - run.measurements[i - 1].exposure_ns), 10.0,
+                  0.01);
+    }
+  }
+}
+
+TEST_F(Modules, ValvesAreLearntAndEventsLandWhereTheyShould) {
+  HandMadePlan plan(machine_);
+  plan.From(200, 300);
+  double x = 200;
+  for (int i = 0; i < 20; ++i) {
+    plan.LineTo(x += 5, 300, 250);
+    plan.Gate(GateKind::kPierce, 0.05);
+    plan.LineTo(x += 20, 300, 100);
+    plan.EventAt(ProcessAction::kAbrasiveOff, plan.s_mm() - 9.0);
+    plan.EventAt(ProcessAction::kJetOff, plan.s_mm() - 8.0);
+  }
+  VirtualCell cell(machine_, simulated_plant::RandomPlant(machine_, 4), {});
+  const CellRun run = cell.Run(plan.Finish(10));
+  ASSERT_TRUE(run.complete);
+  ASSERT_EQ(run.process_records.size(), 40u);
+  std::vector<double> deviations;
+  for (const ProcessRecord& record : run.process_records) {
+    deviations.push_back(std::abs(record.deviation_mm));
+    EXPECT_NEAR(record.s_rate_mm_per_s, 100.0, 1.0);
+  }
+  std::sort(deviations.begin() + 2, deviations.end());
+  std::printf("event deviation at 100 mm/s on a virtual clock: first %.4f, then median %.4f, worst %.4f mm\n",
+              deviations[0], deviations[21], deviations[39]);
+  EXPECT_LE(deviations[21], 0.02);
+  EXPECT_LE(deviations[39], 0.1);
+}
+
+TEST_F(Modules, TheLoopsAllocateNothingAfterStart) {
+  Cut();
+  // Steps of the cores alone: the virtual link around them is a test's, and allocates.
+  drive::DriveCore& drive = cell_.drive_core();
+  main_motion::MainMotionCore& main_motion = cell_.main_motion_core();
+  std::int64_t now_ns = cell_.now_ns();
+  LinkFigures link;
+  link.round_trip_s = 1e-4;
+  MainMotionState peer = cell_.main_motion();
+  DriveState state = cell_.drive();
+  const double s_before = state.s_mm;
+  const std::uint64_t before = allocations.load();
+  for (int i = 0; i < 800; ++i) {
+    now_ns += 1'000'000;
+    drive.Step(now_ns, {.commands = {}, .peer = {&peer, 1}, .segments = {}, .process = {}, .link = link});
+    state = drive.state();
+    main_motion.Step(now_ns,
+                     {.commands = {}, .peer = {&state, 1}, .process = {}, .segments = {}, .link = link});
+    peer = main_motion.state();
+  }
+  EXPECT_EQ(allocations.load() - before, 0u);
+  EXPECT_GT(drive.state().s_mm, s_before + 5.0) << "the loops were at work";
+}
+
+}  // namespace
+}  // namespace lambdajet::tests
