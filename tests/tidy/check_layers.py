@@ -73,6 +73,8 @@ def door_fault(house, room, header, houses):
             return None
         if head == "simulated_plant" and house in ("drive", "main_motion") and room in ("", "simulation"):
             return None  # the node's main introduces its plant
+        if head == "link" and house in ("drive", "main_motion"):
+            return None  # what the doors of both machine modules share
         return f"the {house} house includes the {head} house; only cores named in services/README.md may be shared"
     if head == "lambdajet" and ".pb.h" in header and room == "bus":
         return "a bus door speaks IDL, not proto"
