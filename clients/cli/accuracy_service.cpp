@@ -103,7 +103,7 @@ void AddAccuracyServiceVerbs(CLI::App& noun, Output& output, const Connections& 
       noun, "predict", "contour error of a plan that trajectory has: bound, budget, worst places");
   predict->add_option("PLAN", options->plan_id, "the plan's id")->required();
   predict->add_flag("--compensated", options->compensated, "the plan carries elastic feed-forward");
-  predict->add_option("--draws", options->draws, "Monte Carlo draws, 0 is linear only; default 400");
+  predict->add_option("--draws", options->draws, "Monte Carlo draws, 0 is linear only; default 1000");
   predict->add_option("--seed", options->seed, "of the draws; default 1");
   predict->callback([=, &output, &connections] { output.Finish(Predict(*options, connections, output)); });
 

@@ -82,7 +82,8 @@ TEST(Prediction, LinearAndMonteCarloAgree) {
   ASSERT_EQ(one.reason, PredictionReason::kPredicted);
   EXPECT_NEAR(one.predicted_95_mm, one.predicted_95_linear_mm, 0.06 * one.predicted_95_linear_mm);
   const auto many = Predict(UncertainMachine(), CirclePlan(250, 200, 100, 60), false, options);
-  EXPECT_NEAR(many.predicted_95_mm, many.predicted_95_linear_mm, 0.15 * many.predicted_95_linear_mm);
+  // Linear takes 95 % at each point by itself; a cut is bad where any of many causes is.
+  EXPECT_NEAR(many.predicted_95_mm, many.predicted_95_linear_mm, 0.2 * many.predicted_95_linear_mm);
 }
 
 TEST(Prediction, BoundGrowsWithCovariance) {

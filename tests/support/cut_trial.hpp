@@ -3,7 +3,7 @@
 //
 // Model: the shipped cores of trajectory, drive, main motion, calibration, accuracy and inspection; the truth is drawn by the
 // simulated plant's own generator around the machine as designed and nobody but plant and judge reads it.
-// Units: mm, s. Threads: one; the same machine, part and seed give the same trial, bit by bit. Cost: see tests/benchmark/README.md.
+// Units: mm, s. Threads: one; the same machine, part and seed give the same trial, bit by bit. Cost: some two seconds a plant.
 // Errors: `trouble` says in words what could not be done.
 #pragma once
 

@@ -130,6 +130,7 @@ bool AddPoint(std::span<const PlanSample> samples, const std::vector<Eigen::Vect
   point.p_W_mm = Place(samples[i]);
   point.n_W = NormalAt(samples, i);
   point.v_W_mm_per_s = Velocity(samples[i]);
+  point.a_W_mm_per_s2 = Acceleration(samples[i]);
   const auto inverse = kinematics::SolveInverse(model.chain.mechanism, model.chain.EffectorAt(point.p_W_mm));
   point.place = SensitivityAt(model.chain, point.p_W_mm);
   if (!inverse.positioned || !point.place.valid) {

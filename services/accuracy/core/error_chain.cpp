@@ -20,6 +20,8 @@ double NormalDensity(double x) { return std::exp(-0.5 * x * x) / std::sqrt(2.0 *
 
 double Square(double x) { return x * x; }
 
+constexpr double kMeanOfHalfNormal = 0.7978845608028654;  // root of 2/pi
+
 double& At(std::array<double, kSourceCount>& values, Source source) {
   return values[static_cast<std::size_t>(source)];
 }
@@ -51,6 +53,7 @@ ErrorChain::ErrorChain(const MachineDescription& machine)
       X_EW(machine.X_EW()),
       R_WE(X_EW.rotation().transpose()),
       reference_feed_mm_per_s(machine.path.feed_mm_per_s),
+      reference_acceleration_mm_per_s2(machine.path.acceleration_mm_per_s2),
       jet_lag_time_s(machine.process.jet_lag_time_s),
       elastic_lag_s2(machine.value(Parameter::kElasticLagS2)),
       damping_time_s(machine.value(Parameter::kDampingTimeS)) {
@@ -81,9 +84,15 @@ PlaceSensitivity SensitivityAt(const ErrorChain& chain, const Eigen::Vector2d& p
   return place;
 }
 
+double ServoBias(const ErrorChain& chain, const PlaceSensitivity& place, const Eigen::Vector2d& n_W,
+                 const Eigen::Vector2d& a_W_mm_per_s2) {
+  const Eigen::Vector2d surge = place.J_q_p * a_W_mm_per_s2 / chain.reference_acceleration_mm_per_s2;
+  return -kMeanOfHalfNormal * chain.uncertainties.following_mm * n_W.dot(place.J_p_q * surge);
+}
+
 std::array<double, kSourceCount> VarianceBySource(const ErrorChain& chain, const PlaceSensitivity& place,
                                                   const SensitivityRow& row, const Eigen::Vector2d& n_W,
-                                                  const Eigen::Vector2d& v_W_mm_per_s, double lag_bias_mm) {
+                                                  const JetMotion& motion, double lag_bias_mm) {
   std::array<double, kSourceCount> variance{};
   const SensitivityRow share = row * chain.covariance;
   for (std::size_t i = 0; i < kParameterCount; ++i) {
@@ -94,9 +103,13 @@ std::array<double, kSourceCount> VarianceBySource(const ErrorChain& chain, const
   At(variance, Source::kJetOffset) = 0.5 * (Square(offset[0]) + Square(offset[1]) + Square(offset[2]));
   const Eigen::Vector2d slider = place.J_p_q.transpose() * n_W;
   const Eigen::Vector2d rail = place.J_p_rail.transpose() * n_W;
-  const Eigen::Vector2d rate = place.J_q_p * v_W_mm_per_s / chain.reference_feed_mm_per_s;
+  const Eigen::Vector2d rate = place.J_q_p * motion.v_W_mm_per_s / chain.reference_feed_mm_per_s;
+  const Eigen::Vector2d surge = place.J_q_p * motion.a_W_mm_per_s2 / chain.reference_acceleration_mm_per_s2;
+  constexpr double kVarianceOfHalfNormal = 1.0 - kMeanOfHalfNormal * kMeanOfHalfNormal;
   const Uncertainties& u = chain.uncertainties;
-  At(variance, Source::kFollowing) = Square(u.following_mm) * slider.cwiseProduct(rate).squaredNorm();
+  At(variance, Source::kFollowing) =
+      Square(u.following_mm) * (slider.cwiseProduct(rate).squaredNorm() +
+                                kVarianceOfHalfNormal * slider.cwiseProduct(surge).squaredNorm());
   At(variance, Source::kBacklash) = Square(0.5 * u.backlash_mm) * slider.squaredNorm();
   At(variance, Source::kStraightness) = Square(u.straightness_mm) * rail.squaredNorm();
   At(variance, Source::kJetWander) = Square(u.jet_wander_mm);
@@ -119,8 +132,9 @@ ContourError ContourErrorAt(const ErrorChain& chain, const JetMotion& motion, bo
   row[Index(Parameter::kElasticLagS2)] = -a_n;
   const double lag_bias = 0.5 * Square(chain.jet_lag_time_s) * a_n;
   At(error.bias_by_source_mm, Source::kElastic) = compensated ? 0.0 : -chain.elastic_lag_s2 * a_n;
+  At(error.bias_by_source_mm, Source::kFollowing) = ServoBias(chain, place, n, motion.a_W_mm_per_s2);
   At(error.bias_by_source_mm, Source::kJetLag) = lag_bias;
-  error.variance_by_source_mm2 = VarianceBySource(chain, place, row, n, motion.v_W_mm_per_s, lag_bias);
+  error.variance_by_source_mm2 = VarianceBySource(chain, place, row, n, motion, lag_bias);
   double variance = 0.0;
   for (std::size_t i = 0; i < kSourceCount; ++i) {
     error.bias_mm += error.bias_by_source_mm[i];

@@ -1,18 +1,21 @@
-// Propagates what is not known of a machine to where the jet meets the sheet: sensitivities, and the contour
-// error of one point of a motion.
+// Propagates what is not known of a machine to where the jet meets the sheet: sensitivities, and the contour error of one
+// point of a motion.
 //
-// Model: the sheet's point under the jet is p_WJ = R_EW^T (p_DJ - p_DE(q) - p_EW) (frames.md); first order in
-// every parameter with the slider readings held. Along the contour's normal n, with acceleration a_n on the
-// side of n:
-//     elastic   bias -(m/k) a_n, gone if compensated; sensitivity to m/k: -a_n either way (seed paper 000,
-//     delta = m a/k) jet lag   bias +T^2 a_n/2, to the inside (core/jet_lag.hpp) following slider i lags by
-//     f_i q_i'/feed, f_i of sigma following_mm; backlash +-width/2 by the sign of q_i' straightness of rail i
-//     acts like its offset; jet wander as it is
-// The quasi-static elastic bias stands for the peak of a jerk-limited motion; core/prediction.hpp plays the
-// spring instead. Frames: everything in W but the sliders. Units: mm, s, rad; variances mm^2. Shapes: a
-// sensitivity row is ordered as foundation's Parameter. Threads: an ErrorChain is immutable once built. Cost:
-// ContourErrorAt below 1 us, no allocation. Errors: `valid` false where the mechanism cannot stand or cannot
-// be differentiated.
+// Model: the sheet's point under the jet is p_WJ = R_EW^T (p_DJ - p_DE(q) - p_EW) (frames.md); first order in every
+// parameter with the slider readings held. Along the contour's normal n, with acceleration a_n on the side of n:
+//     elastic      bias -(m/k) a_n, gone if compensated; sensitivity to m/k: -a_n either way (seed paper 000, delta = m a/k)
+//     jet lag      bias +T^2 a_n/2, to the inside (core/jet_lag.hpp)
+//     following    slider i lags by f_i q_i'/feed, f_i of sigma following_mm, and as any servo of finite bandwidth by
+//                  |g_i| q_i''/path acceleration, g_i likewise
+//     backlash     +-width/2 of slider i by the sign of q_i'
+//     straightness of rail i acts like its offset
+//     jet offset   the axis leaves the head's by the jet stack's tilts (core/jet_stack.hpp) until version 1 has found it
+//     jet wander   as it is
+// The quasi-static elastic bias stands for the peak of a jerk-limited motion; core/prediction.hpp plays the spring instead.
+// Frames: everything in W but the sliders. Units: mm, s, rad; variances mm^2.
+// Shapes: a sensitivity row is ordered as foundation's Parameter.
+// Threads: an ErrorChain is immutable once built. Cost: ContourErrorAt below 1 us, no allocation.
+// Errors: `valid` false where the mechanism cannot stand or cannot be differentiated.
 #pragma once
 
 #include <Eigen/Core>
@@ -89,6 +92,7 @@ struct ErrorChain {
   PlanarPose X_EW;
   Eigen::Matrix2d R_WE;  // E is parallel to D
   double reference_feed_mm_per_s;
+  double reference_acceleration_mm_per_s2;
   double jet_lag_time_s;
   double elastic_lag_s2;
   double damping_time_s;
@@ -106,7 +110,11 @@ PlaceSensitivity SensitivityAt(const ErrorChain& chain, const Eigen::Vector2d& p
 // Variances by source of the deviation along n, for a given row of parameter sensitivities.
 std::array<double, kSourceCount> VarianceBySource(const ErrorChain& chain, const PlaceSensitivity& place,
                                                   const SensitivityRow& row, const Eigen::Vector2d& n_W,
-                                                  const Eigen::Vector2d& v_W_mm_per_s, double lag_bias_mm);
+                                                  const JetMotion& motion, double lag_bias_mm);
+
+// What servos of finite bandwidth cut outside on arcs, expected: they answer q'' late.
+double ServoBias(const ErrorChain& chain, const PlaceSensitivity& place, const Eigen::Vector2d& n_W,
+                 const Eigen::Vector2d& a_W_mm_per_s2);
 
 // Of one point; `normal` to the left of the velocity, or along x at standstill.
 ContourError ContourErrorAt(const ErrorChain& chain, const JetMotion& motion, bool compensated);

@@ -59,9 +59,12 @@ PointErrors PropagateLinearly(const ContourModel& model) {
     row[Index(Parameter::kDampingTimeS)] = by_damping[i].dot(point.n_W);
     errors.bias_mm[i].fill(0.0);
     errors.bias_mm[i][static_cast<std::size_t>(Source::kElastic)] = elastic[i].dot(point.n_W);
+    errors.bias_mm[i][static_cast<std::size_t>(Source::kFollowing)] =
+        ServoBias(chain, point.place, point.n_W, point.a_W_mm_per_s2);
     errors.bias_mm[i][static_cast<std::size_t>(Source::kJetLag)] = point.lag_bias_mm;
     errors.variance_mm2[i] =
-        VarianceBySource(chain, point.place, row, point.n_W, point.v_W_mm_per_s, point.lag_bias_mm);
+        VarianceBySource(chain, point.place, row, point.n_W,
+                         {point.p_W_mm, point.v_W_mm_per_s, point.a_W_mm_per_s2}, point.lag_bias_mm);
   }
   return errors;
 }
@@ -170,15 +173,17 @@ std::vector<FeaturePrediction> ListFeatures(const ContourModel& model,
   return features;
 }
 
-// Upper limit with 95 % confidence, from draws: the order statistic at 0.95 (n + 1).
-double UpperQuantile(std::vector<double>& values, double fraction) {
-  if (values.empty()) {
-    return 0.0;
-  }
-  const double rank = std::ceil(fraction * (static_cast<double>(values.size()) + 1.0)) - 1.0;
-  const auto at = static_cast<std::ptrdiff_t>(std::min(rank, static_cast<double>(values.size()) - 1.0));
+double OrderStatistic(std::vector<double>& values, double rank) {
+  const double last = static_cast<double>(values.size()) - 1.0;
+  const auto at = static_cast<std::ptrdiff_t>(std::clamp(std::ceil(rank) - 1.0, 0.0, last));
   std::ranges::nth_element(values, values.begin() + at);
   return values[static_cast<std::size_t>(at)];
+}
+
+// The quantile's upper limit with 95 % confidence, free of any distribution.
+double UpperQuantile(std::vector<double>& values, double fraction) {
+  const double n = static_cast<double>(values.size());
+  return OrderStatistic(values, n * fraction + 1.6448536 * std::sqrt(n * fraction * (1.0 - fraction)));
 }
 
 double ShareWithin(const std::vector<double>& values, double tolerance_mm) {
@@ -208,7 +213,7 @@ void Sample(const ContourModel& model, const PredictionOptions& options, Contour
     }
   }
   prediction.conformity = ShareWithin(all, options.tolerance_mm);
-  prediction.expected_95_mm = UpperQuantile(all, 0.5);
+  prediction.expected_95_mm = OrderStatistic(all, 0.5 * static_cast<double>(all.size()));
   prediction.predicted_95_mm = UpperQuantile(all, 0.95);
   for (std::size_t f = 0; f < by_feature.size(); ++f) {
     prediction.features[f].conformity = ShareWithin(by_feature[f], options.tolerance_mm);
@@ -227,6 +232,8 @@ enum Drawn : std::uint64_t {
   kRail2Sine,
   kRail2Cosine,
   kLag,
+  kServo1,
+  kServo2,
   kAzimuth1,
   kAzimuth2,
   kAzimuth3,
@@ -241,6 +248,7 @@ struct DrawnMachine {
   Eigen::Vector2d p_EW_mm;
   Eigen::Matrix2d R_WE;
   Eigen::Array2d following;    // slider error by slider rate, s
+  Eigen::Array2d servo_s2;     // and by its acceleration
   Eigen::Array2d backlash_mm;  // half width
   Eigen::Array2d sine_mm;
   Eigen::Array2d cosine_mm;
@@ -263,6 +271,8 @@ DrawnMachine DrawMachine(const ContourModel& model, const CounterStream& random)
   m.R_WE = PlanarPose{0.0, 0.0, m.parameters[Index(Parameter::kSheetThetaRad)]}.rotation().transpose();
   m.following = u.following_mm / chain.reference_feed_mm_per_s *
                 Eigen::Array2d(random.Normal(kFollowing1), random.Normal(kFollowing2));
+  m.servo_s2 = u.following_mm / chain.reference_acceleration_mm_per_s2 *
+               Eigen::Array2d(random.Normal(kServo1), random.Normal(kServo2)).abs();
   m.backlash_mm = 0.5 * u.backlash_mm * Eigen::Array2d(random.Normal(kBacklash1), random.Normal(kBacklash2));
   m.sine_mm = u.straightness_mm * Eigen::Array2d(random.Normal(kRail1Sine), random.Normal(kRail2Sine));
   m.cosine_mm = u.straightness_mm * Eigen::Array2d(random.Normal(kRail1Cosine), random.Normal(kRail2Cosine));
@@ -289,7 +299,8 @@ double ParameterDeviation(const ErrorChain& chain, const DrawnMachine& m, const 
 double SliderDeviation(const DrawnMachine& m, const ContourModel::Point& point) {
   const Eigen::Array2d rate = (point.place.J_q_p * point.v_W_mm_per_s).array();
   const Eigen::Array2d turn = 2.0 * std::numbers::pi / kRailWaveLengthMm * point.actuator_position_mm.array();
-  const Eigen::Array2d slider_mm = m.following * rate + m.backlash_mm * rate.sign();
+  const Eigen::Array2d surge = (point.place.J_q_p * point.a_W_mm_per_s2).array();
+  const Eigen::Array2d slider_mm = m.following * rate - m.servo_s2 * surge + m.backlash_mm * rate.sign();
   const Eigen::Array2d rail_mm = m.sine_mm * turn.sin() + m.cosine_mm * turn.cos();
   return point.n_W.dot(point.place.J_p_q * slider_mm.matrix() + point.place.J_p_rail * rail_mm.matrix());
 }
