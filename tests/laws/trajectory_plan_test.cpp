@@ -209,5 +209,40 @@ TEST(PlanLaws, SameInputsSamePlan) {
   EXPECT_NE(PlanPartProgram(text, m, other).plan.id, a.plan.id);
 }
 
+// Resume backs up by the overlap, pierces there, and meets every later event and gate where the whole plan has it.
+TEST(PlanLaws, ResumesOnTheSamePathLength) {
+  const MachineDescription m = DemoLikeMachine();
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    SCOPED_TRACE(seed);
+    const std::string text = RandomProgram(seed).Make();
+    const PlannedProgram whole = PlanPartProgram(text, m, {});
+    ASSERT_TRUE(whole.faults.empty());
+    PlanOptions options;
+    options.start_from_s_mm = 0.5 * whole.plan.length_mm;
+    const PlannedProgram rest = PlanPartProgram(text, m, options);
+    ASSERT_TRUE(rest.faults.empty());
+    EXPECT_NE(rest.plan.id, whole.plan.id);
+    EXPECT_NEAR(rest.plan.length_mm, whole.plan.length_mm, 1e-6);
+    const double begin_s_mm = rest.plan.segments.front().s_mm.value(0.0);
+    ASSERT_FALSE(rest.plan.gates.empty());
+    EXPECT_EQ(rest.plan.gates.front().kind, GateKind::kPierce);
+    EXPECT_NEAR(rest.plan.gates.front().s_mm, begin_s_mm, 1e-9);
+    EXPECT_GE(begin_s_mm, *options.start_from_s_mm - options.overlap_mm - 1e-9);
+    const std::size_t events_gone = whole.plan.events.size() - rest.plan.events.size();
+    for (std::size_t i = 0; i < rest.plan.events.size(); ++i) {
+      EXPECT_EQ(rest.plan.events[i].action, whole.plan.events[events_gone + i].action);
+      EXPECT_NEAR(rest.plan.events[i].s_mm, whole.plan.events[events_gone + i].s_mm, 1e-6);
+    }
+    EXPECT_NEAR(rest.samples.back().x_W_mm, whole.samples.back().x_W_mm, 1e-9);
+    ExpectClosedGates(rest.plan);
+    ExpectContinuity(rest.plan);
+  }
+  PlanOptions beyond;
+  beyond.start_from_s_mm = 1e6;
+  const PlannedProgram nothing = PlanPartProgram(RandomProgram(1).Make(), m, beyond);
+  ASSERT_EQ(nothing.faults.size(), 1u);
+  EXPECT_EQ(nothing.faults[0].reason, "START_BEYOND_END");
+}
+
 }  // namespace
 }  // namespace lambdajet::trajectory
