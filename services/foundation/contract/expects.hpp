@@ -6,17 +6,16 @@
 
 #include <cstdio>
 #include <cstdlib>
-#include <source_location>
 
 namespace lambdajet {
 
-inline void Expects(bool condition, const char* what,
-                    std::source_location where = std::source_location::current()) {
+// The built-in functions rather than std::source_location: clang 14 has them and cannot use libstdc++'s class.
+inline void Expects(bool condition, const char* what, const char* file = __builtin_FILE(),
+                    unsigned line = __builtin_LINE(), const char* function = __builtin_FUNCTION()) {
   if (condition) [[likely]] {
     return;
   }
-  std::fprintf(stderr, "%s:%u: %s: contract broken: %s\n", where.file_name(), where.line(), where.function_name(),
-               what);
+  std::fprintf(stderr, "%s:%u: %s: contract broken: %s\n", file, line, function, what);
   std::abort();
 }
 
