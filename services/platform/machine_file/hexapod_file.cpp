@@ -9,6 +9,8 @@ namespace lambdajet {
 namespace {
 
 using yaml_file::Findings;
+using yaml_file::IdText;
+using yaml_file::IsId;
 using yaml_file::MapReader;
 using yaml_file::ParseNumber;
 using yaml_file::ShortestText;
@@ -89,8 +91,9 @@ HexapodMachine ReadAll(const YAML::Node& root, Findings& findings) {
   HexapodMachine machine;
   MapReader file(root, "", findings);
   machine.machine_id = file.Text("machine_id");
-  if (file.Has("machine_id") && (machine.machine_id.empty() || machine.machine_id.size() > 63)) {
-    findings.Add("machine_id", file.LineOfKey("machine_id"), "is not 1 to 63 characters", "WRONG_VALUE");
+  if (file.Has("machine_id") && !IsId(machine.machine_id)) {
+    findings.Add("machine_id", file.LineOfKey("machine_id"), "is not 1 to 63 of a-z, 0-9 and '-'",
+                 "WRONG_VALUE");
   }
   ReadStruts(file, findings, machine.geometry);
   machine.geometry.X_MP_home = ReadPose(file, "home", findings);
@@ -143,7 +146,7 @@ absl::StatusOr<HexapodMachine> ReadHexapodFile(const std::string& path) {
 
 std::string HexapodText(const HexapodMachine& machine) {
   const HexapodGeometry& g = machine.geometry;
-  std::string text = "machine_id: " + machine.machine_id + "\nstruts:\n";
+  std::string text = "machine_id: " + IdText(machine.machine_id) + "\nstruts:\n";
   for (std::size_t j = 0; j < static_cast<std::size_t>(kStruts); ++j) {
     const auto column = static_cast<Eigen::Index>(j);
     text += "  - p_MA_mm: " + PointText(g.p_MA_mm.col(column)) +

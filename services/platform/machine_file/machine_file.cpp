@@ -15,6 +15,8 @@ namespace lambdajet {
 namespace {
 
 using yaml_file::Findings;
+using yaml_file::IdText;
+using yaml_file::IsId;
 using yaml_file::MapReader;
 using yaml_file::ParseNumber;
 using yaml_file::ShortestText;
@@ -165,11 +167,6 @@ void ReadSheet(MapReader& file, Findings& findings, MachineDescription& machine)
   }
 }
 
-bool IsId(const std::string& text) {
-  return !text.empty() && text.size() <= 63 &&
-         text.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789-") == std::string::npos;
-}
-
 MachineDescription ReadAll(const YAML::Node& root, Findings& findings) {
   MachineDescription machine;
   MapReader file(root, "", findings);
@@ -291,8 +288,8 @@ absl::StatusOr<MachineDescription> ReadMachineFile(const std::string& path) {
 }
 
 std::string MachineText(const MachineDescription& machine) {
-  return "machine_id: " + machine.machine_id + "\nversion: " + std::to_string(machine.version) + "\n" +
-         ContentText(machine);
+  return "machine_id: " + IdText(machine.machine_id) + "\nversion: " + std::to_string(machine.version) +
+         "\n" + ContentText(machine);
 }
 
 absl::Status WriteMachineFile(const std::string& path, const MachineDescription& machine) {

@@ -46,6 +46,17 @@ inline bool ParseNumber(const std::string& text, double& number) {
   return error == std::errc() && end == text.data() + text.size();
 }
 
+// Whether a text may be a machine's name, here as on the wire.
+inline bool IsId(const std::string& text) {
+  return !text.empty() && text.size() <= 63 &&
+         text.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789-") == std::string::npos;
+}
+
+// A machine's name as it is written: in quotes where YAML would read a list or nothing at all.
+inline std::string IdText(const std::string& id) {
+  return id.starts_with('-') || id == "null" ? '"' + id + '"' : id;
+}
+
 // What is wrong with a file so far, and on which line each key stands.
 class Findings {
  public:
