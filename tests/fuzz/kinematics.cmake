@@ -1,25 +1,2 @@
-# A fuzz target: replayed from its kept corpus in every test run; with LAMBDAJET_FUZZ (clang) also a libFuzzer program
-# fuzz_<name>, run long by tests/long/fuzz.
-option(LAMBDAJET_FUZZ "Build the libFuzzer programs (clang)" OFF)
-function(lambdajet_fuzz_target name)
-  cmake_parse_arguments(FUZZ "" "MUTATIONS" "DEPS" ${ARGN})
-  add_executable(replay_${name} replay.cpp ${name}_fuzzer.cpp)
-  lambdajet_own_code(replay_${name})
-  target_include_directories(replay_${name} PRIVATE ${CMAKE_SOURCE_DIR})
-  target_link_libraries(replay_${name} PRIVATE ${FUZZ_DEPS})
-  file(MAKE_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/${name})
-  add_test(NAME fuzz_${name} COMMAND replay_${name} ${CMAKE_CURRENT_SOURCE_DIR}/corpus/${name} ${FUZZ_MUTATIONS}
-    WORKING_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/${name})
-  set_tests_properties(fuzz_${name} PROPERTIES LABELS fuzz TIMEOUT 120)
-  if(LAMBDAJET_FUZZ)
-    add_executable(fuzz_${name} ${name}_fuzzer.cpp)
-    lambdajet_own_code(fuzz_${name})
-    target_include_directories(fuzz_${name} PRIVATE ${CMAKE_SOURCE_DIR})
-    target_compile_options(fuzz_${name} PRIVATE -fsanitize=fuzzer)
-    target_link_options(fuzz_${name} PRIVATE -fsanitize=fuzzer)
-    target_link_libraries(fuzz_${name} PRIVATE ${FUZZ_DEPS})
-  endif()
-endfunction()
-
 lambdajet_fuzz_target(machine_file MUTATIONS 300 DEPS platform_machine_file foundation_trouble)
 lambdajet_fuzz_target(kinematics_wire MUTATIONS 3000 DEPS kinematics_rpc)

@@ -1,46 +1,19 @@
 // Any bytes as a request of kinematics.proto: a status with a reason, or an answer without NaN or infinity.
 //
 // The first byte chooses the question. Workspace and optimisation are cancelled at once: their converters are what is tried.
-#include <cmath>
 #include <string>
 
 #include "foundation/contract/trouble.hpp"
 #include "kinematics/rpc/kinematics_answers.hpp"
 #include "kinematics/rpc/wire_workspace.hpp"
+#include "tests/fuzz/all_finite.hpp"
 #include "tests/fuzz/fuzz_target.hpp"
 
 namespace lambdajet::kinematics {
 namespace {
 
+using fuzz::AllFinite;
 using fuzz::Promise;
-using google::protobuf::FieldDescriptor;
-using google::protobuf::Message;
-
-// Every double of a message and of those in it.
-bool AllFinite(const Message& message) {
-  const auto* reflection = message.GetReflection();
-  std::vector<const FieldDescriptor*> fields;
-  reflection->ListFields(message, &fields);
-  for (const FieldDescriptor* field : fields) {
-    const int count = field->is_repeated() ? reflection->FieldSize(message, field) : 1;
-    for (int i = 0; i < count; ++i) {
-      if (field->cpp_type() == FieldDescriptor::CPPTYPE_DOUBLE) {
-        const double number = field->is_repeated() ? reflection->GetRepeatedDouble(message, field, i)
-                                                   : reflection->GetDouble(message, field);
-        if (!std::isfinite(number)) {
-          return false;
-        }
-      } else if (field->cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE) {
-        const Message& inner = field->is_repeated() ? reflection->GetRepeatedMessage(message, field, i)
-                                                    : reflection->GetMessage(message, field);
-        if (!AllFinite(inner)) {
-          return false;
-        }
-      }
-    }
-  }
-  return true;
-}
 
 template <class Request, class Response, class Ask>
 void Try(const std::string& bytes, Ask ask) {
