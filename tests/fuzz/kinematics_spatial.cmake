@@ -3,7 +3,7 @@ lambdajet_own_code(hexapod_questions)
 target_include_directories(hexapod_questions PUBLIC ${CMAKE_SOURCE_DIR})
 target_link_libraries(hexapod_questions PUBLIC kinematics_rpc)
 
-lambdajet_fuzz_target(kinematics_hexapod MUTATIONS 500 DEPS hexapod_questions)
+lambdajet_fuzz_target(kinematics_hexapod MUTATIONS 3000 DEPS hexapod_questions)
 lambdajet_fuzz_target(hexapod_file MUTATIONS 300 DEPS platform_machine_file foundation_trouble kinematics_spatial)
 lambdajet_check(fuzz_kinematics_hexapod_mutations LABELS fuzz TIMEOUT 300 SOURCES kinematics_hexapod_fuzz_test.cpp
   DEPS hexapod_questions platform_machine_file)
