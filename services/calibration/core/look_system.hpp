@@ -26,7 +26,7 @@
 namespace lambdajet::calibration {
 
 inline constexpr int kMarkSize = 2;
-inline constexpr int kRunSize = 6;
+inline constexpr int kRunSize = 8;
 
 // A look in its whitened form at the point last evaluated.
 struct LookRow {
@@ -57,6 +57,8 @@ class LookSystem {
   const MachineDescription& machine() const { return machine_; }
   LookUnknowns Start() const;
 
+  // Takes tracking pictures for noisier than stated: their covariance times `variance_scale`, from the next Relinearise() on.
+  void SetTrackingNoise(double variance_scale) { tracking_noise_ = variance_scale; }
   // Takes the effector's motion of the tracking runs, and the looks' covariances, at these parameters.
   void Relinearise(const ParameterVector& z);
   // False where the mechanism cannot be assembled at some look; rows are then not to be used.
@@ -81,6 +83,7 @@ class LookSystem {
 
   MachineDescription machine_;
   Prior prior_;
+  double tracking_noise_ = 1.0;
   std::vector<Measurement> looks_;
   std::vector<int> mark_ids_;
   std::vector<std::size_t> mark_of_;
