@@ -1,11 +1,10 @@
-// Makes runs of camera looks from a machine of known truth, with exactly the noise the calibration model
-// assumes.
+// Makes runs of camera looks from a machine of known truth, with exactly the noise the calibration model assumes.
 //
-// Model: truth drawn from the machine file's sigmas; looks as services/calibration/core/look_model.hpp
-// predicts them for the truth, plus camera noise, marks off their places, jet wander, and the effector off by
-// straightness and backlash. The sheet's swing in a tracking run is integrated by classical Runge-Kutta at
-// 0.1 ms, not by the code under test. Frames, units: foundation/geometry/frames.md; mm, s. Threads: one
-// generator, one thread.
+// Model: truth drawn from the machine file's sigmas; looks as services/calibration/core/look_model.hpp predicts them for
+// the truth, plus camera noise, marks off their places, jet wander, and the effector off by straightness and backlash. The
+// sheet's swing in a tracking run is integrated by classical Runge-Kutta at 0.1 ms, not by the code under test.
+// Frames, units: foundation/geometry/frames.md; mm, s.
+// Threads: one generator, one thread.
 #pragma once
 
 #include <Eigen/Core>
@@ -57,7 +56,7 @@ inline MachineDescription PaperSizedMachine() {
     a = {-3000.0, 3000.0, 1000.0, 2000.0, 20000.0};
   }
   m.path = {150.0, 300.0, 500.0, 20000.0, 0.02};
-  m.process.measuring_settle_time_s = 0.3;
+  m.process.measuring_settle_time_s = 5.0;  // no swing left in the looks at rest
   m.process.pierce_time_s = 0.5;
   m.uncertainties = {0.003, 0.004, 0.005, 0.003, 0.005, 0.005, 0.1};
   m.sheet_width_mm = 500.0;

@@ -1,8 +1,8 @@
 // Brings looks from main motion to the desk, and the active machine from the desk to everyone.
 //
-// Model: looks wait in a bounded queue and are written to the store in batches, one transaction each, by a thread of this room;
-// a look with a number that is not finite is counted and dropped. If the store cannot take a batch the room says so and tries
-// again: nothing is lost while the queue has room. The description is written at once and on every activation.
+// Model: looks wait in a bounded queue and are written to the store in batches, one transaction each, by a thread of this
+// room; a look with a number that is not finite is counted and dropped. If the store cannot take a batch the room says so
+// and tries again: nothing is lost while the queue has room. The description is written at once and on every activation.
 // Threads: one of its own; Open() and the destructor in main. The desk must not activate after the destructor.
 // Errors: those of the bus.
 #pragma once

@@ -1,6 +1,7 @@
 // Translates between the bus types of looks and machine descriptions and the core's.
 //
-// Threads: pure. Errors: FromWire gives nothing for a look that holds a number that is not finite.
+// Threads: pure.
+// Errors: FromWire gives nothing for a look that holds a number that is not finite.
 #pragma once
 
 #include <optional>

@@ -1,14 +1,15 @@
-// Integrates the sheet's elastic deflection along a moving effector exactly, from one slider reading to the
-// next.
+// Integrates the sheet's elastic deflection along a moving effector exactly, from one slider reading to the next.
 //
-// Model: seed paper 000, elastic error; lumped mass on a spring at the tool, m u'' + c u' + k u = -m a(t),
-// written with lag = m/k and damping = c/k as  lag u'' + damping u' + u = -lag a(t). Over one step a(t) is a
-// cubic, so that
+// Model: seed paper 000, elastic error; lumped mass on a spring at the tool, m u'' + c u' + k u = -m a(t), written with lag
+// = m/k and damping = c/k as  lag u'' + damping u' + u = -lag a(t). Over one step a(t) is a cubic, so that
 //     u(t) = u_p(t) + e^{-s t} [w0 C(t) + (w0' + s w0) S(t)],   s = damping / (2 lag),   x = 1/lag - s^2,
-// with u_p the cubic particular solution, w = u - u_p, C = cos(sqrt(x) t), S = sin(sqrt(x) t)/sqrt(x), or
-// cosh and sinh for x < 0: exact for any step, damping and stiffness; no time step to choose. Units: mm, s;
-// lag s^2, damping s. Shapes: the scalar S is double or a Ceres Jet. Validity: lag at or below kLeastLagS2 is
-// taken as that (a rigid machine). Threads: values. Cost: one exp, sin and cos a step.
+// with u_p the cubic particular solution, w = u - u_p, C = cos(sqrt(x) t), S = sin(sqrt(x) t)/sqrt(x), or cosh and sinh for
+// x < 0: exact for any step, damping and stiffness; no time step to choose.
+// Units: mm, s; lag s^2, damping s.
+// Shapes: the scalar S is double or a Ceres Jet.
+// Validity: lag at or below kLeastLagS2 is taken as that (a rigid machine).
+// Threads: values.
+// Cost: one exp, sin and cos a step.
 #pragma once
 
 #include <algorithm>

@@ -14,7 +14,8 @@
 namespace lambdajet::calibration {
 namespace {
 
-constexpr int kMostRounds = 8;  // of naming outliers and fitting again
+constexpr int kMostRounds = 8;         // of naming outliers and fitting again
+constexpr double kMovingMmPerS = 5.0;  // above what encoder steps make of standing sliders
 constexpr double kChanceOfInflation = 1e-3;
 constexpr double kElasticityKnown = 0.3;  // of the prior's sigma
 
@@ -39,7 +40,9 @@ class Fit {
   bool Solve(const std::vector<char>& active, RobustLoss loss, LookUnknowns& at);
   bool FitWithoutOutliers();
   double NoiseScale(bool tracking) const;
+  double TrackingNoise() const;
   std::size_t NameOutliers(std::vector<char>& active) const;
+  std::vector<char> AtRest() const;
   bool HoldOut();
   void Account();
   void Judge();
@@ -119,6 +122,20 @@ double Fit::NoiseScale(bool tracking) const {
                   *middle / (2.0 * std::numbers::ln2));  // median of chi-square with two degrees of freedom
 }
 
+// Mean square of the good tracking pictures' residuals, per reading; never below 1. What the spring-mass model does not know
+// of a moving machine (servo, stamps, backlash on reversal) comes out here and must not pass for knowledge of the base.
+double Fit::TrackingNoise() const {
+  double sum = 0.0;
+  double count = 0.0;
+  for (std::size_t i = 0; i < looks_.size(); ++i) {
+    if (active_[i] && looks_[i].kind == LookKind::kTracking) {
+      sum += system_.row(i).residual.squaredNorm();
+      count += 2.0;
+    }
+  }
+  return count > 0.0 && sum > count * (1.0 + 3.0 * std::sqrt(2.0 / count)) ? sum / count : 1.0;
+}
+
 // Judges every look at the point last evaluated, those left out before too; returns how many changed sides.
 std::size_t Fit::NameOutliers(std::vector<char>& active) const {
   const double quantile = -2.0 * std::log(options_.outlier_probability);  // of two degrees of freedom
@@ -144,6 +161,8 @@ bool Fit::FitWithoutOutliers() {
     }
     NameOutliers(active_);
   }
+  found_.tracking_noise = TrackingNoise();
+  system_.SetTrackingNoise(found_.tracking_noise);
   for (int round = 0; round < kMostRounds; ++round) {
     if (!GoOn(0.4 + 0.02 * round, "least squares without outliers")) {
       return false;
@@ -162,37 +181,62 @@ bool Fit::FitWithoutOutliers() {
   return true;
 }
 
-// Every mark and hole in turn is predicted by a fit that has not seen it.
-bool Fit::HoldOut() {
-  std::vector<std::size_t> held;
+// Looks at marks and holes while the sliders stood, most of the time in a tracking run: only these are predicted in the hold-out.
+std::vector<char> Fit::AtRest() const {
+  std::vector<char> at_rest(looks_.size(), 1);
+  std::vector<int> moving(system_.run_count(), 0);  // pictures in motion less those at rest
   for (std::size_t i = 0; i < looks_.size(); ++i) {
-    if (active_[i] && looks_[i].kind != LookKind::kTracking) {
-      held.push_back(i);
+    if (system_.run_of(i) >= 0) {
+      const bool moves = looks_[i].actuator_velocity_mm_per_s.norm() > kMovingMmPerS;
+      moving[static_cast<std::size_t>(system_.run_of(i))] += moves ? 1 : -1;
     }
   }
-  if (options_.hold_out_folds < 2 || held.size() < 8) {
+  for (std::size_t i = 0; i < looks_.size(); ++i) {
+    at_rest[i] =
+        active_[i] && (system_.run_of(i) < 0 || moving[static_cast<std::size_t>(system_.run_of(i))] < 0);
+  }
+  return at_rest;
+}
+
+// Every mark and hole in turn is predicted by a fit that has not seen it; its looks' mean counts, so that swing averages out.
+bool Fit::HoldOut() {
+  const std::vector<char> at_rest = AtRest();
+  std::vector<char> held(system_.mark_count(), 0);
+  for (std::size_t i = 0; i < looks_.size(); ++i) {
+    held[system_.mark_of(i)] |= at_rest[i];
+  }
+  if (options_.hold_out_folds < 2 || std::count(held.begin(), held.end(), 1) < 8) {
     return true;
   }
+  const std::size_t folds = static_cast<std::size_t>(options_.hold_out_folds);
   double before = 0.0;
   double after = 0.0;
-  const std::size_t folds = static_cast<std::size_t>(options_.hold_out_folds);
   for (std::size_t fold = 0; fold < folds; ++fold) {
     if (!GoOn(0.6 + 0.3 * static_cast<double>(fold) / static_cast<double>(folds),
               "predicting looks held out")) {
       return false;
     }
     std::vector<char> training = active_;
-    for (const std::size_t i : held) {
-      training[i] = system_.mark_of(i) % folds == fold ? 0 : training[i];
+    for (std::size_t i = 0; i < looks_.size(); ++i) {
+      training[i] = held[system_.mark_of(i)] && system_.mark_of(i) % folds == fold ? 0 : training[i];
     }
     LookUnknowns at = at_;
     if (!Solve(training, RobustLoss::kNone, at)) {
       return false;
     }
-    for (const std::size_t i : held) {
-      if (!training[i]) {
-        before += before_mm_[i].squaredNorm();
-        after += system_.row(i).miss_mm.squaredNorm();
+    std::vector<Eigen::Vector3d> sum_before(system_.mark_count(), Eigen::Vector3d::Zero());  // x, y, count
+    std::vector<Eigen::Vector3d> sum_after = sum_before;
+    for (std::size_t i = 0; i < looks_.size(); ++i) {
+      if (at_rest[i] && !training[i]) {
+        sum_before[system_.mark_of(i)] += Eigen::Vector3d(before_mm_[i].x(), before_mm_[i].y(), 1.0);
+        sum_after[system_.mark_of(i)] +=
+            Eigen::Vector3d(system_.row(i).miss_mm.x(), system_.row(i).miss_mm.y(), 1.0);
+      }
+    }
+    for (std::size_t m = 0; m < sum_after.size(); ++m) {
+      if (sum_after[m].z() > 0.0) {
+        before += (sum_before[m].head<2>() / sum_before[m].z()).squaredNorm();
+        after += (sum_after[m].head<2>() / sum_after[m].z()).squaredNorm();
         ++found_.held_out;
       }
     }
@@ -278,11 +322,17 @@ Identification Fit::Stop(IdentificationReason reason, std::string explanation) {
 Identification Fit::Run() {
   found_.parameters = prior_.mean;
   found_.covariance = system_.machine().covariance;
-  if (2 * looks_.size() < kParameterCount) {
-    return Stop(IdentificationReason::kTooFew, Text("%zu usable looks give %zu readings for %zu parameters "
-                                                    "(%zu looks refused); at least %zu looks are needed",
-                                                    looks_.size(), 2 * looks_.size(), kParameterCount,
-                                                    found_.refused.size(), (kParameterCount + 1) / 2));
+  // Pictures of one tracking run show one place.
+  const std::size_t places =
+      system_.run_count() +
+      static_cast<std::size_t>(std::count_if(
+          looks_.begin(), looks_.end(), [](const Measurement& m) { return m.kind != LookKind::kTracking; }));
+  if (2 * places < kParameterCount) {
+    return Stop(IdentificationReason::kTooFew,
+                Text("%zu usable looks give %zu readings for %zu parameters (%zu looks refused); at least "
+                     "%zu looks are "
+                     "needed",
+                     places, 2 * places, kParameterCount, found_.refused.size(), (kParameterCount + 1) / 2));
   }
   if (!system_.Evaluate(at_)) {
     return Stop(IdentificationReason::kNotConverged, "the mechanism cannot be assembled at the readings");

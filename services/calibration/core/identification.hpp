@@ -1,18 +1,19 @@
-// Identifies all 19 parameters of the machine from a run of camera looks, with covariance, outliers and what
-// stays unknown.
+// Identifies all 19 parameters of the machine from a run of camera looks, with covariance, outliers and what stays unknown.
 //
 // Model: the most probable parameters under the machine file's sigmas as priors,
 //     min |z|^2 + |marks|^2 + |runs|^2 + sum rho(|r_i|^2),
-// with the residuals of core/look_system.hpp. Three stages, each by Levenberg-Marquardt (Ceres): Huber's loss
-// brings the fit near with gross errors present, Cauchy's lets go of them, and the last stage is plain least
-// squares without the looks named as outliers (chance of a good look below `outlier_probability`), so that
-// covariance and chi-square mean what they say. Covariance: (I + information)^-1 in z, marks and runs
-// eliminated, carried to the parameters' units; inflated by chi-square over its degrees of freedom where
-// chance would give less than one such run in a thousand. chi-square is the whole minimum, priors included:
-// its expectation is the number of residuals. Validity: a fit is answered with IDENTIFIED only if the jet's
-// place on the sheet comes out within `needed_place_mm` (95 %). Threads: pure function; `watch` is called
-// between iterations on the caller's thread. Cost: 60 looks some milliseconds, see tests/benchmark.
-// Deterministic; independent of the looks' order. Errors: the answer's reason.
+// with the residuals of core/look_system.hpp. Three stages, each by Levenberg-Marquardt (Ceres): Huber's loss brings the
+// fit near with gross errors present, Cauchy's lets go of them, and the last stage is plain least squares without the looks
+// named as outliers (chance of a good look below `outlier_probability`), so that covariance and chi-square mean what they
+// say.
+// Covariance: (I + information)^-1 in z, marks and runs eliminated, carried to the parameters' units; inflated by
+// chi-square over its degrees of freedom where chance would give less than one such run in a thousand. chi-square is the
+// whole minimum, priors included: its expectation is the number of residuals.
+// Validity: a fit is answered with IDENTIFIED only if the jet's place on the sheet comes out within `needed_place_mm` (95
+// %).
+// Threads: pure function; `watch` is called between iterations on the caller's thread.
+// Cost: 60 looks some milliseconds, see tests/benchmark. Deterministic; independent of the looks' order.
+// Errors: the answer's reason.
 #pragma once
 
 #include <cstddef>
@@ -65,6 +66,8 @@ struct Identification {
   ParameterVector parameters = ParameterVector::Zero();
   ParameterCovariance covariance = ParameterCovariance::Zero();
   double covariance_inflation = 1.0;
+  double tracking_noise =
+      1.0;  // variance of tracking pictures against the stated one, as found and then used
   std::vector<LookResidual> residuals;  // usable looks, by exposure
   std::vector<RefusedLook> refused;
   double chi_square = 0.0;
@@ -72,7 +75,7 @@ struct Identification {
   double p_value = 1.0;
   double rms_before_mm = 0.0;  // of the looks used, each coordinate
   double rms_after_mm = 0.0;
-  std::size_t held_out = 0;  // looks predicted by fits that did not contain them
+  std::size_t held_out = 0;  // marks and holes predicted by fits that did not contain them
   double hold_out_before_mm = 0.0;
   double hold_out_after_mm = 0.0;
   Observability observability;

@@ -69,12 +69,12 @@ LookPrediction PredictLook(const MachineDescription& machine, const ParameterVec
   }
   const Eigen::Matrix2d R_JD = Rotation(parameters[At(Parameter::kBaseThetaRad)]).transpose();
   Eigen::Vector2d from_jet_D;  // of the mark
-  if (look.kind == LookKind::kHole) {
+  if (IsHole(look)) {
     const EffectorPlace pierced = PlaceEffector(machine, parameters, look.pierce_actuator_position_mm);
     if (!pierced.closed) {
       return prediction;
     }
-    from_jet_D = now.p_DE_mm - pierced.p_DE_mm;
+    from_jet_D = now.p_DE_mm + deflection_D_mm - pierced.p_DE_mm;
     prediction.J.leftCols<kMechanismSize>() = R_JD * (now.J_x_parameters - pierced.J_x_parameters);
   } else {
     const auto p_W = MarkPlace(machine, look.mark);

@@ -1,15 +1,16 @@
-// Predicts what the camera sees and where the jet stands on the sheet, each with its derivatives to all 19
-// parameters.
+// Predicts what the camera sees and where the jet stands on the sheet, each with its derivatives to all 19 parameters.
 //
 // Model: the chain of foundation/geometry/frames.md,
 //     still:    p_C = R_DJ^T (p_DE(q) + u + X_EW p_W - p_DJ) - p_JC
 //     hole:     p_C = R_DJ^T (p_DE(q) - p_DE(q_pierce)) - p_JC       (its place p_W = X_EW^-1 (p_DJ -
 //     p_DE(q_pierce)) put in) jet:      p_WJ = X_EW^-1 (p_DJ - p_DE(q))
-// with p_DE(q) the lambda mechanism's forward solution and u the elastic deflection (0 at rest). A mark or
-// hole off its place, by the sheet's making or by the jet's wander, adds straight to p_C. Frames: p_C in the
-// camera's frame C, u in D. Units: mm, rad. Threads: pure functions. Cost: one forward solution with nine
-// derivatives, under a microsecond; no allocation. Errors: `closed` is false where the mechanism cannot be
-// assembled at the readings; no answer holds NaN.
+// with p_DE(q) the lambda mechanism's forward solution and u the elastic deflection (0 at rest). A mark or hole off its
+// place, by the sheet's making or by the jet's wander, adds straight to p_C.
+// Frames: p_C in the camera's frame C, u in D.
+// Units: mm, rad.
+// Threads: pure functions.
+// Cost: one forward solution with nine derivatives, under a microsecond; no allocation.
+// Errors: `closed` is false where the mechanism cannot be assembled at the readings; no answer holds NaN.
 #pragma once
 
 #include <Eigen/Core>

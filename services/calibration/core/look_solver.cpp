@@ -145,9 +145,19 @@ SolveReport SolveLooks(LookSystem& system, const std::vector<char>& active, Robu
   AddBlocks(system, whole, active, loss, at, problem);
 
   ceres::Solver::Options options;
-  // Scaled to the priors, the normal matrix is never worse than (prior sigma / posterior sigma)^2: Cholesky
-  // is safe.
-  options.linear_solver_type = ceres::DENSE_NORMAL_CHOLESKY;
+  // Scaled to the priors, the normal matrix is never worse than (prior sigma / posterior sigma)^2: Cholesky is safe. Each look
+  // belongs to one run at most, so runs are eliminated first.
+  options.linear_solver_type = at.runs.empty() ? ceres::DENSE_NORMAL_CHOLESKY : ceres::DENSE_SCHUR;
+  if (!at.runs.empty()) {
+    options.linear_solver_ordering = std::make_shared<ceres::ParameterBlockOrdering>();
+    for (auto& run : at.runs) {
+      options.linear_solver_ordering->AddElementToGroup(run.data(), 0);
+    }
+    for (auto& mark : at.marks) {
+      options.linear_solver_ordering->AddElementToGroup(mark.data(), 1);
+    }
+    options.linear_solver_ordering->AddElementToGroup(at.z.data(), 1);
+  }
   options.num_threads = 1;
   options.max_num_iterations = max_iterations;
   options.function_tolerance = 1e-12;

@@ -1,8 +1,10 @@
 // Solves a system of looks with Ceres and accounts for what the looks alone have told.
 //
-// Model: core/identification.hpp. Frames, units: of core/look_system.hpp, everything scaled to N(0, I)
-// priors. Threads: one solver, one thread; Ceres runs single-threaded, so results repeat to the bit. Cost: a
-// normal matrix of 19 + 2 a mark + 6 a tracking run, a few iterations. Errors: SolveEnd.
+// Model: core/identification.hpp.
+// Frames, units: of core/look_system.hpp, everything scaled to N(0, I) priors.
+// Threads: one solver, one thread; Ceres runs single-threaded, so results repeat to the bit.
+// Cost: a normal matrix of 19 + 2 a mark + 6 a tracking run, a few iterations.
+// Errors: SolveEnd.
 #pragma once
 
 #include <functional>

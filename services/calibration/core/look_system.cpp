@@ -16,6 +16,9 @@ using ElasticJet = ceres::Jet<double, 4>;  // lag, damping, deflection and its v
 
 // A camera without noise would make weights infinite: nothing is read better than a nanometre.
 constexpr double kFinestReadingMm = 1e-6;
+// One sigma of the relative difference of stiffness and of damping between x and y, each way.
+constexpr double kStiffnessApart = 0.05;
+constexpr double kDampingApart = 0.1;
 
 Eigen::Matrix2d Whitening(const Eigen::Matrix2d& covariance) {
   const Eigen::Matrix2d floor = kFinestReadingMm * kFinestReadingMm * Eigen::Matrix2d::Identity();
@@ -30,6 +33,18 @@ Eigen::Matrix2d Root(const Eigen::Matrix2d& covariance) {
   root(1, 0) = root(0, 0) > 0.0 ? covariance(1, 0) / root(0, 0) : 0.0;
   root(1, 1) = std::sqrt(std::max(0.0, covariance(1, 1) - root(1, 0) * root(1, 0)));
   return root;
+}
+
+// What is left of the sheet's swing, one coordinate's root mean square, when the machine has settled for as long as it does: a
+// stop from the path's full acceleration, at the damping of the machine file less a sigma.
+double SwingLeft(const MachineDescription& machine) {
+  const double lag_s2 = std::max(kLeastLagS2, machine.value(Parameter::kElasticLagS2));
+  const int c = At(Parameter::kDampingTimeS);
+  const double damping_s =
+      std::max(0.1 * machine.parameters[c],
+               machine.parameters[c] - std::sqrt(std::max(0.0, machine.covariance(c, c))));
+  const double fade = std::exp(-0.5 * machine.process.measuring_settle_time_s * damping_s / lag_s2);
+  return 0.5 * lag_s2 * machine.path.acceleration_mm_per_s2 * fade;
 }
 
 // Second derivatives at the knots of the C2 cubic spline with given end slopes (Thomas algorithm).
@@ -72,7 +87,7 @@ LookSystem::LookSystem(const MachineDescription& machine, const Prior& prior, st
   whitening_.resize(looks_.size(), Eigen::Matrix2d::Zero());
   deflection_mm_.resize(looks_.size(), Eigen::Vector2d::Zero());
   deflection_J_elastic_.resize(looks_.size(), Eigen::Matrix2d::Zero());
-  deflection_J_state_.resize(looks_.size(), Eigen::Matrix<double, 2, 4>::Zero());
+  deflection_J_run_.resize(looks_.size(), Eigen::Matrix<double, 2, 6>::Zero());
   Relinearise(ParameterVector::Zero());
 }
 
@@ -129,7 +144,12 @@ void LookSystem::TakeMotion(Run& run, const ParameterVector& parameters) {
     const Eigen::Vector2d slope = effector.J_x_q() * look.actuator_velocity_mm_per_s;
     if (k == 0) {
       first_slope = slope;
-      run.offset_scale_mm = Root(R_JD * StraightnessCovariance(machine_, effector) * R_JD.transpose());
+      Eigen::Matrix2d common = StraightnessCovariance(machine_, effector);
+      if (IsHole(look)) {
+        const EffectorPlace pierced = PlaceEffector(machine_, parameters, look.pierce_actuator_position_mm);
+        common += BacklashCovariance(machine_, pierced) + StraightnessCovariance(machine_, pierced);
+      }
+      run.offset_scale_mm = Root(R_JD * common * R_JD.transpose());
     }
     last_slope = slope;
   }
@@ -144,20 +164,21 @@ void LookSystem::Relinearise(const ParameterVector& z) {
   const Eigen::Matrix2d R_JD =
       PlanarPose{0.0, 0.0, parameters[At(Parameter::kBaseThetaRad)]}.rotation().transpose();
   const double camera = machine_.uncertainties.camera_mm;
+  const double swing_mm = SwingLeft(machine_);
   for (std::size_t i = 0; i < looks_.size(); ++i) {
     const Measurement& look = looks_[i];
     const EffectorPlace now = PlaceEffector(machine_, parameters, look.actuator_position_mm);
     Eigen::Matrix2d of_place = BacklashCovariance(machine_, now);
-    if (look.kind != LookKind::kTracking) {
-      of_place +=
-          StraightnessCovariance(machine_, now);  // common to the pictures of a tracking run: its offset
+    if (look.kind != LookKind::kTracking) {  // what is common to the pictures of a tracking run is its offset
+      of_place += StraightnessCovariance(machine_, now) + swing_mm * swing_mm * Eigen::Matrix2d::Identity();
+      if (IsHole(look)) {
+        const EffectorPlace pierced = PlaceEffector(machine_, parameters, look.pierce_actuator_position_mm);
+        of_place += BacklashCovariance(machine_, pierced) + StraightnessCovariance(machine_, pierced);
+      }
     }
-    if (look.kind == LookKind::kHole) {
-      const EffectorPlace pierced = PlaceEffector(machine_, parameters, look.pierce_actuator_position_mm);
-      of_place += BacklashCovariance(machine_, pierced) + StraightnessCovariance(machine_, pierced);
-    }
-    whitening_[i] =
-        Whitening(camera * camera * Eigen::Matrix2d::Identity() + R_JD * of_place * R_JD.transpose());
+    const Eigen::Matrix2d covariance =
+        camera * camera * Eigen::Matrix2d::Identity() + R_JD * of_place * R_JD.transpose();
+    whitening_[i] = Whitening(look.kind == LookKind::kTracking ? tracking_noise_ * covariance : covariance);
   }
   for (Run& run : runs_) {
     TakeMotion(run, parameters);
@@ -165,14 +186,19 @@ void LookSystem::Relinearise(const ParameterVector& z) {
 }
 
 bool LookSystem::EvaluateDeflections(const ParameterVector& parameters, const LookUnknowns& at) {
-  const ElasticJet lag(parameters[At(Parameter::kElasticLagS2)], 0);
-  const ElasticJet damping(parameters[At(Parameter::kDampingTimeS)], 1);
+  const double lag_s2 = parameters[At(Parameter::kElasticLagS2)];
+  const double damping_s = parameters[At(Parameter::kDampingTimeS)];
   for (std::size_t r = 0; r < runs_.size(); ++r) {
     const Run& run = runs_[r];
+    const auto& n = at.runs[r];
     for (int axis = 0; axis < 2; ++axis) {
-      Deflection<ElasticJet> state{
-          ElasticJet(run.deflection_scale_mm * at.runs[r][2 + 2 * axis], 2),
-          ElasticJet(run.deflection_rate_scale_mm_per_s * at.runs[r][3 + 2 * axis], 3)};
+      const double sign = axis == 0 ? 1.0 : -1.0;
+      const double lag_factor = std::exp(sign * kStiffnessApart * n[6]);  // positive whatever n
+      const double damping_factor = std::exp(sign * kDampingApart * n[7]);
+      const ElasticJet lag(lag_s2 * lag_factor, 0);
+      const ElasticJet damping(damping_s * damping_factor, 1);
+      Deflection<ElasticJet> state{ElasticJet(run.deflection_scale_mm * n[2 + 2 * axis], 2),
+                                   ElasticJet(run.deflection_rate_scale_mm_per_s * n[3 + 2 * axis], 3)};
       for (std::size_t k = 0; k < run.count; ++k) {
         if (k > 0) {
           const double step = run.step_s[k - 1];
@@ -183,15 +209,18 @@ bool LookSystem::EvaluateDeflections(const ParameterVector& parameters, const Lo
               AccelerationCubic<ElasticJet>{ElasticJet(a0), ElasticJet(a1), ElasticJet(0.0), ElasticJet(0.0)},
               step);
         }
-        const std::size_t i = run.first + k;
-        deflection_mm_[i][axis] = state.u_mm.a;
-        deflection_J_elastic_[i].row(axis) = state.u_mm.v.head<2>().transpose();
-        deflection_J_state_[i].row(axis).setZero();
-        deflection_J_state_[i](axis, 2 * axis) = state.u_mm.v[2];
-        deflection_J_state_[i](axis, 2 * axis + 1) = state.u_mm.v[3];
-        if (!std::isfinite(state.u_mm.a) || !state.u_mm.v.allFinite()) {
+        const auto& J = state.u_mm.v;
+        if (!std::isfinite(state.u_mm.a) || !J.allFinite()) {
           return false;
         }
+        const std::size_t i = run.first + k;
+        deflection_mm_[i][axis] = state.u_mm.a;
+        deflection_J_elastic_[i].row(axis) << J[0] * lag_factor, J[1] * damping_factor;
+        deflection_J_run_[i].row(axis).setZero();
+        deflection_J_run_[i](axis, 2 * axis) = J[2] * run.deflection_scale_mm;
+        deflection_J_run_[i](axis, 2 * axis + 1) = J[3] * run.deflection_rate_scale_mm_per_s;
+        deflection_J_run_[i](axis, 4) = J[0] * lag_s2 * lag_factor * sign * kStiffnessApart;
+        deflection_J_run_[i](axis, 5) = J[1] * damping_s * damping_factor * sign * kDampingApart;
       }
     }
   }
@@ -214,7 +243,7 @@ bool LookSystem::Evaluate(const LookUnknowns& at) {
     LookRow& row = rows_[i];
     row.miss_mm = predicted.p_C_mm - look.p_C_mm;
     const double mark_sigma =
-        look.kind == LookKind::kHole ? machine_.uncertainties.jet_wander_mm : machine_.uncertainties.mark_mm;
+        IsHole(look) ? machine_.uncertainties.jet_wander_mm : machine_.uncertainties.mark_mm;
     row.J_mark = mark_sigma * whitening_[i];
     row.residual = whitening_[i] * row.miss_mm + row.J_mark * at.marks[mark_of_[i]];
     if (run_of_[i] >= 0) {
@@ -226,16 +255,13 @@ bool LookSystem::Evaluate(const LookUnknowns& at) {
           0.5 * R_JD * Eigen::Vector2d(-deflection_mm_[i].y(), deflection_mm_[i].x());
       predicted.J.col(At(Parameter::kRail1AngleRad)) += half_turn;
       predicted.J.col(At(Parameter::kRail2AngleRad)) += half_turn;
-      Eigen::Matrix<double, 2, 4> J_state = deflection_J_state_[i];
-      J_state.col(0) *= run.deflection_scale_mm;
-      J_state.col(1) *= run.deflection_rate_scale_mm_per_s;
-      J_state.col(2) *= run.deflection_scale_mm;
-      J_state.col(3) *= run.deflection_rate_scale_mm_per_s;
       row.J_run.leftCols<2>() = whitening_[i] * run.offset_scale_mm;
-      row.J_run.rightCols<4>() = whitening_[i] * R_JD * J_state;
+      row.J_run.rightCols<6>() = whitening_[i] * R_JD * deflection_J_run_[i];
       row.residual +=
           row.J_run.leftCols<2>() * at.runs[r].head<2>();  // the state is in the deflection already
     }
+    row.J_move << whitening_[i] * predicted.J.middleCols<2>(At(Parameter::kBaseXMm)),
+        whitening_[i] * predicted.J.col(At(Parameter::kSheetThetaRad));
     row.J_z.noalias() = (whitening_[i] * predicted.J) * prior_.scale;
   }
   return true;

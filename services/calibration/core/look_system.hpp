@@ -1,18 +1,19 @@
 // Lines up a run of looks as one system of whitened residuals with its derivatives, for any solver.
 //
-// Model: unknowns, all scaled to a prior N(0, I): z, the 19 parameters (core/prior.hpp); for each mark or
-// hole two, its place off the drawing's or the jet's wander, as the camera sees it; for each tracking run
-// six: a common offset by straightness of the rails, and deflection and its velocity at the first picture in
-// x and y. Residual of a look, C its covariance from camera, backlash and straightness (at rest) and C^-1 =
-// K^T K:
+// Model: unknowns, all scaled to a prior N(0, I): z, the 19 parameters (core/prior.hpp); for each mark or hole two, its
+// place off the drawing's or the jet's wander, as the camera sees it; for each tracking run eight: a common offset by
+// straightness of the rails, deflection and its velocity at the first picture in x and y, and by how much m/k and c/k in x
+// are above, in y below their mean (levers are not quite equally stiff both ways; the parameters are the means). Residual
+// of a look, C its covariance from camera, backlash and straightness (at rest) and C^-1 = K^T K:
 //     r = K (p_C(z, deflection) + sigma_mark m + offset - p_C,seen)
-// The deflection in a tracking run integrates core/elastic_response.hpp over the effector's motion, which is
-// the C2 cubic spline through the readings' places with the measured velocities at its ends; the motion is
-// taken at the parameters of the last Relinearise(), since its change with them is of second order (0.1 % of
-// a deflection of 0.4 mm). Frames: deflections in D, offsets and residuals in C. Units: mm, s before
-// whitening. Validity: looks selected by SelectUsable(), in its order. Pictures of a run come at 20 Hz or
-// faster; a gap of more than kLongestGapS starts a new run. Threads: one system, one thread. Cost: Evaluate()
-// about 2 microseconds a look, without allocation.
+// The deflection in a tracking run integrates core/elastic_response.hpp over the effector's motion, which is the C2 cubic
+// spline through the readings' places with the measured velocities at its ends; the motion is taken at the parameters of
+// the last Relinearise(), since its change with them is of second order (0.1 % of a deflection of 0.4 mm).
+// Frames: deflections in D, offsets and residuals in C.
+// Units: mm, s before whitening.
+// Validity: looks selected by SelectUsable(), in its order.
+// Threads: one system, one thread.
+// Cost: Evaluate() about 2 microseconds a look, without allocation.
 #pragma once
 
 #include <Eigen/Core>
@@ -33,6 +34,8 @@ struct LookRow {
   Eigen::Vector2d miss_mm = Eigen::Vector2d::Zero();   // predicted by the parameters alone, minus seen
   Eigen::Vector2d residual = Eigen::Vector2d::Zero();  // whitened, with mark and run taken in
   Eigen::Matrix<double, 2, kAll> J_z = Eigen::Matrix<double, 2, kAll>::Zero();
+  Eigen::Matrix<double, 2, 3> J_move =
+      Eigen::Matrix<double, 2, 3>::Zero();  // to base x, y and sheet theta, unscaled
   Eigen::Matrix2d J_mark = Eigen::Matrix2d::Zero();
   Eigen::Matrix<double, 2, kRunSize> J_run = Eigen::Matrix<double, 2, kRunSize>::Zero();
 };
@@ -93,7 +96,7 @@ class LookSystem {
   std::vector<LookRow> rows_;
   std::vector<Eigen::Vector2d> deflection_mm_;                     // in D, of tracking looks
   std::vector<Eigen::Matrix<double, 2, 2>> deflection_J_elastic_;  // to lag and damping
-  std::vector<Eigen::Matrix<double, 2, 4>> deflection_J_state_;    // to u_x, v_x, u_y, v_y at the run's start
+  std::vector<Eigen::Matrix<double, 2, 6>> deflection_J_run_;      // to the last six of the run's
 };
 
 }  // namespace lambdajet::calibration

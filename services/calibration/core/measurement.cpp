@@ -17,8 +17,8 @@ bool Finite(const Measurement& m) {
 }
 
 bool Known(const MachineDescription& machine, const Measurement& m) {
-  if (m.kind == LookKind::kHole) {
-    return m.mark > kFirstHole;
+  if (IsHole(m)) {
+    return true;
   }
   return std::any_of(machine.marks.begin(), machine.marks.end(),
                      [&](const SheetMark& s) { return s.id == m.mark; });
@@ -26,8 +26,7 @@ bool Known(const MachineDescription& machine, const Measurement& m) {
 
 bool Reached(const MachineDescription& machine, const Measurement& m) {
   return PlaceEffector(machine, machine.parameters, m.actuator_position_mm).closed &&
-         (m.kind != LookKind::kHole ||
-          PlaceEffector(machine, machine.parameters, m.pierce_actuator_position_mm).closed);
+         (!IsHole(m) || PlaceEffector(machine, machine.parameters, m.pierce_actuator_position_mm).closed);
 }
 
 // Everything that can differ, so that the order of arrival never matters.

@@ -1,12 +1,13 @@
-// Holds one look of the camera, and sorts a run of looks into what identification can use and what it must
-// refuse.
+// Holds one look of the camera, and sorts a run of looks into what identification can use and what it must refuse.
 //
-// Model: a *still* look is taken at a gate, the sheet at rest, of a mark of known place; a *hole* is a still
-// look at a hole that the jet pierced earlier in the same run; a *tracking* picture is taken while the sheet
-// moves. Frames: the camera's frame C of foundation/geometry/frames.md; slider readings are encoder readings.
+// Model: a *still* look is taken at a gate after the machine's settling time; *tracking* pictures follow a mark or hole, the
+// sheet moving or swinging out at rest; a *hole* is what the jet pierced earlier in the same run.
+// Frames: the camera's frame C of foundation/geometry/frames.md; slider readings are encoder readings.
 // Units: mm, s; stamps are common time in ns.
-// Validity: numbers from outside; SelectUsable() refuses what is not finite, not seen, unknown, out of reach
-// or repeated. Threads: values. Cost: a sort. Errors: answers, one refusal a measurement with its reason.
+// Validity: numbers from outside; SelectUsable() refuses what is not finite, not seen, unknown, out of reach or repeated.
+// Threads: values.
+// Cost: a sort.
+// Errors: answers, one refusal a measurement with its reason.
 #pragma once
 
 #include <Eigen/Core>
@@ -35,6 +36,9 @@ struct Measurement {
   Eigen::Vector2d actuator_acceleration_mm_per_s2 = Eigen::Vector2d::Zero();
   Eigen::Vector2d pierce_actuator_position_mm = Eigen::Vector2d::Zero();  // of a hole, while it was pierced
 };
+
+// A look at a pierced hole, at rest or followed.
+inline bool IsHole(const Measurement& look) { return look.mark > kFirstHole; }
 
 // What the wire says about a look: gate 0 is tracking, ids above kFirstHole are holes.
 LookKind KindOf(std::uint32_t gate, int mark);

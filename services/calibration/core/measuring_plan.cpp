@@ -21,6 +21,8 @@ constexpr double kShakeRadius_mm = 4.0;
 constexpr double kShakeShare = 0.9;  // of the path's acceleration
 constexpr int kTurns = 4;
 constexpr double kSwingOut_s = 0.4;
+constexpr double kWatch_s = 0.4;  // three swings and more
+constexpr double kStepAside_mm = 0.3;
 constexpr double kLook_s = 0.15;  // exposure, gate and start of the next move, beside settling
 
 struct Candidate {
@@ -242,10 +244,20 @@ class ProgramText {
     at_ = p_W;
     Line("G0 X%.4f Y%.4f", p_W.x(), p_W.y());
   }
+  // Pictures from the stop on while the sheet swings out: identification takes the swing out of them, so nobody waits for it.
   void Look(const Eigen::Vector2d& jet_W, int id) {
     GoTo(jet_W);
-    Line("M100 P%d", id);
-    time_s_ += machine_.process.measuring_settle_time_s + kLook_s;
+    if (!marked_) {  // the one gate with a look: a run begins with it, should the same program be played again
+      marked_ = true;
+      Line("M100 P%d", id);
+      time_s_ += machine_.process.measuring_settle_time_s + kLook_s;
+    }
+    Line("M101 P%d", id);
+    Line("G4 P%.2f", kWatch_s);
+    Line("G0 X%.4f", jet_W.x() + kStepAside_mm);  // the way on which M102 can take place
+    Line("M102");
+    at_ = {jet_W.x() + kStepAside_mm, jet_W.y()};
+    time_s_ += kWatch_s + kLook_s;
   }
   void Spend(double time_s) { time_s_ += time_s; }
   void Pierce(const Eigen::Vector2d& p_W, double pierce_s) {
@@ -263,6 +275,7 @@ class ProgramText {
   Eigen::Vector2d at_ = Eigen::Vector2d::Zero();
   double time_s_ = 0.0;
   bool started_ = false;
+  bool marked_ = false;
 };
 
 // Strokes in x and y, whose reversals make the sheet swing, then circles of two sizes, then rest.
@@ -302,8 +315,7 @@ void Open(const MachineDescription& machine, const char* title, ProgramText& pro
 double TimeOf(const MachineDescription& machine, const std::vector<Candidate>& order) {
   double time_s = 0.0;
   for (std::size_t i = 0; i < order.size(); ++i) {
-    time_s += machine.process.measuring_settle_time_s + kLook_s +
-              (i > 0 ? Travel(machine, order[i - 1].jet_W_mm, order[i].jet_W_mm) : 0.0);
+    time_s += kWatch_s + kLook_s + (i > 0 ? Travel(machine, order[i - 1].jet_W_mm, order[i].jet_W_mm) : 0.0);
   }
   return time_s;
 }

@@ -1,14 +1,17 @@
 // Writes the part program of a measuring run: which marks to look at, where to pierce on trial, how to shake the sheet.
 //
 // Model: looks are chosen one by one from the marks in reach so that each adds most to log det(I + information) of the 19
-// parameters scaled to their priors (Bayesian D-optimal design, greedy: Chaloner and Verdinelli, Statistical Science 10, 1995,
-// section 2), then put into a short order (nearest neighbour and 2-opt). Trial pierces stand in
-// the sheet's corners, clear of marks; the camera looks at each hole. Shaking: strokes and circles about a mark at nine tenths of the path's
+// parameters scaled to their priors (Bayesian D-optimal design, greedy: Chaloner and Verdinelli, Statistical Science 10,
+// 1995, section 2), then put into a short order (nearest neighbour and 2-opt). Trial pierces stand in the sheet's corners,
+// clear of marks; the camera looks at each hole. Shaking: strokes and circles about a mark at nine tenths of the path's
 // acceleration in x and in y, then a rest during which the sheet swings out; the camera follows the mark throughout.
 // Frames: the program is written in W; its coordinates are the jet's nominal place, so that the mark stands in the picture.
+// Each place is watched from the stop on for some swings of the sheet (core/look_system.hpp takes the swing out).
 // Words: M100 P<mark> takes a look at rest, M101 P<mark> … M102 follows a mark, M3 P<s> … M5 pierces; as
 // services/trajectory/README.md.
-// Units: mm, s; mm/min in the program. Threads: pure. Cost: looks times marks times a 19 x 19 solve.
+// Units: mm, s; mm/min in the program.
+// Threads: pure.
+// Cost: looks times marks times a 19 x 19 solve.
 // Errors: the answer's reason.
 #pragma once
 

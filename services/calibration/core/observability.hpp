@@ -1,14 +1,14 @@
 // Says in numbers and in words what a run of looks can tell about the 19 parameters and what it cannot.
 //
-// Model: `information` is the looks' own information on z, parameters scaled to one prior sigma
-// (core/prior.hpp), with marks and tracking runs eliminated (Schur complement). Its eigenvalue for a
-// direction is (prior sigma / sigma from the looks alone)^2: above 1 the looks know that combination better
-// than the machine file does, below 1 the machine file decides. Gauge freedoms are changes that no look can
-// see because they change no cut either: D's origin and direction are free, so X_DJ and X_EW may move
-// together, and slider zeros and rail offsets may move with them. The priors settle how such a change is
-// shared out; the place of the jet on the sheet does not depend on it. Units: eigenvalues have none;
-// directions in the parameters' own units for one prior sigma. Threads: pure. Cost: one eigenvalue
-// decomposition of 19 x 19.
+// Model: `information` is the looks' own information on z, parameters scaled to one prior sigma (core/prior.hpp), with
+// marks and tracking runs eliminated (Schur complement). Its eigenvalue for a direction is (prior sigma / sigma from the
+// looks alone)^2: above 1 the looks know that combination better than the machine file does, below 1 the machine file
+// decides. Gauge freedoms are changes that no look can see because they change no cut either: D's origin and direction are
+// free, so X_DJ and X_EW may move together, and slider zeros and rail offsets may move with them. The priors settle how
+// such a change is shared out; the place of the jet on the sheet does not depend on it.
+// Units: eigenvalues have none; directions in the parameters' own units for one prior sigma.
+// Threads: pure.
+// Cost: one eigenvalue decomposition of 19 x 19.
 #pragma once
 
 #include <string>

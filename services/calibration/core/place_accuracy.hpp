@@ -1,9 +1,12 @@
 // Carries the parameters' covariance to where it is money: the place of the jet on the sheet.
 //
-// Model: at the readings a controller with these parameters would drive to, p_WJ changes by J d(parameters),
-// so its covariance is J C J^T; the circle of 95 % is taken from the larger axis, 2.4477 sigma (chi-square of
-// two degrees of freedom). Frames: p_WJ in W. Units: mm. Threads: pure. Cost: an inverse and a forward
-// solution a place.
+// Model: at the readings a controller with these parameters would drive to, p_WJ changes by J d(parameters), so its
+// covariance is J C J^T; the circle of 95 % is taken from the larger axis, 2.4477 sigma (chi-square of two degrees of
+// freedom).
+// Frames: p_WJ in W.
+// Units: mm.
+// Threads: pure.
+// Cost: an inverse and a forward solution a place.
 #pragma once
 
 #include <Eigen/Core>

@@ -13,63 +13,57 @@
 namespace lambdajet::calibration {
 namespace {
 
+constexpr std::size_t kMostLooks = 600;  // of which a dense covariance is made
+
+// Everything whitened by the looks' own noise.
 struct Innovation {
-  Eigen::VectorXd r_mm;        // seen minus predicted
-  Eigen::MatrixXd covariance;  // S
+  Eigen::VectorXd r;           // seen minus predicted
+  Eigen::MatrixXd covariance;  // S: noise, parameters, marks and tracking runs
   Eigen::MatrixXd move;        // A: of the looks by shift of the module and turn of the sheet
-  double reach_mm = 0.0;       // of the looks from their middle
+  double reach_mm = 0.0;       // of the marks looked at from their middle
 };
 
-// Unwhitened rows of the system at its prior.
-bool Line(const MachineDescription& machine, const std::vector<Measurement>& looks, Innovation& line) {
-  const auto n = static_cast<Eigen::Index>(2 * looks.size());
-  line = {Eigen::VectorXd::Zero(n), Eigen::MatrixXd::Zero(n, n), Eigen::MatrixXd::Zero(n, 3), 0.0};
-  Eigen::MatrixXd J(n, kAll);
-  const Eigen::Matrix2d R_JD = machine.X_DJ().rotation().transpose();
-  const double camera = machine.uncertainties.camera_mm;
-  const double mark = machine.uncertainties.mark_mm;
-  for (std::size_t i = 0; i < looks.size(); ++i) {
+Innovation Line(const LookSystem& system) {
+  const auto n = static_cast<Eigen::Index>(2 * system.look_count());
+  const auto marks = static_cast<Eigen::Index>(kMarkSize * system.mark_count());
+  const auto runs = static_cast<Eigen::Index>(kRunSize * system.run_count());
+  Innovation line{Eigen::VectorXd::Zero(n), {}, Eigen::MatrixXd::Zero(n, 3), 0.0};
+  Eigen::MatrixXd J = Eigen::MatrixXd::Zero(n, kAll + marks + runs);  // to all that is N(0, I)
+  Eigen::Vector2d middle = Eigen::Vector2d::Zero();
+  for (std::size_t i = 0; i < system.look_count(); ++i) {
     const auto at = static_cast<Eigen::Index>(2 * i);
-    const LookPrediction predicted = PredictLook(machine, machine.parameters, looks[i]);
-    if (!predicted.closed) {
-      return false;
+    const LookRow& row = system.row(i);
+    line.r.segment<2>(at) = -row.residual;
+    line.move.middleRows<2>(at) = row.J_move;
+    J.block<2, kAll>(at, 0) = row.J_z;
+    J.block<2, kMarkSize>(at, kAll + static_cast<Eigen::Index>(kMarkSize * system.mark_of(i))) = row.J_mark;
+    if (system.run_of(i) >= 0) {
+      J.block<2, kRunSize>(at, kAll + marks + kRunSize * system.run_of(i)) = row.J_run;
     }
-    const EffectorPlace place = PlaceEffector(machine, machine.parameters, looks[i].actuator_position_mm);
-    line.r_mm.segment<2>(at) = looks[i].p_C_mm - predicted.p_C_mm;
-    J.middleRows<2>(at) = predicted.J;
-    const Eigen::Matrix2d of_place =
-        StraightnessCovariance(machine, place) + BacklashCovariance(machine, place);
-    line.covariance.block<2, 2>(at, at) =
-        R_JD * of_place * R_JD.transpose() + (camera * camera + 1e-12) * Eigen::Matrix2d::Identity();
-    line.move.block<2, 2>(at, 0) = predicted.J.middleCols<2>(At(Parameter::kBaseXMm));
-    line.move.block<2, 1>(at, 2) = predicted.J.col(At(Parameter::kSheetThetaRad));
-    for (std::size_t j = 0; j < looks.size(); ++j) {
-      if (looks[j].mark == looks[i].mark) {
-        line.covariance.block<2, 2>(at, static_cast<Eigen::Index>(2 * j)) +=
-            mark * mark * Eigen::Matrix2d::Identity();
-      }
-    }
+    middle += *MarkPlace(system.machine(), system.look(i).mark) / static_cast<double>(system.look_count());
   }
-  line.covariance += J * machine.covariance * J.transpose();
-  // The turn is taken about the looks' middle, so that it does not shift them as a whole.
-  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
-  for (Eigen::Index at = 0; at < n; at += 2) {
-    mean += line.move.block<2, 1>(at, 2) * (2.0 / static_cast<double>(n));
+  // The turn is taken about the marks' middle, so that it does not shift them as a whole: a turn about W's origin less the
+  // shift that it gives the middle, both seen through base x and y.
+  const Eigen::Matrix2d R_DW = system.machine().X_EW().rotation();
+  const Eigen::Vector2d arm = R_DW * middle;
+  const Eigen::Vector2d shift(-arm.y(), arm.x());
+  for (std::size_t i = 0; i < system.look_count(); ++i) {
+    const auto at = static_cast<Eigen::Index>(2 * i);
+    line.move.block<2, 1>(at, 2) += line.move.block<2, 2>(at, 0) * shift;
+    line.reach_mm =
+        std::max(line.reach_mm, (*MarkPlace(system.machine(), system.look(i).mark) - middle).norm());
   }
-  for (Eigen::Index at = 0; at < n; at += 2) {
-    line.move.block<2, 1>(at, 2) -= mean;
-    line.reach_mm = std::max(line.reach_mm, line.move.block<2, 1>(at, 2).norm());
-  }
-  return true;
+  line.covariance = Eigen::MatrixXd::Identity(n, n) + J * J.transpose();
+  return line;
 }
 
 void Estimate(const Innovation& line, Verification& found) {
   const Eigen::LLT<Eigen::MatrixXd> root(line.covariance);
-  const Eigen::VectorXd whitened_r = root.matrixL().solve(line.r_mm);
+  const Eigen::VectorXd whitened_r = root.matrixL().solve(line.r);
   const Eigen::MatrixXd whitened_A = root.matrixL().solve(line.move);
   const Eigen::Matrix3d normal = whitened_A.transpose() * whitened_A;
   found.chi_square = whitened_r.squaredNorm();
-  found.degrees_of_freedom = static_cast<std::size_t>(line.r_mm.size());
+  found.degrees_of_freedom = static_cast<std::size_t>(line.r.size());
   found.p_value = ChiSquareUpperTail(found.chi_square, static_cast<double>(found.degrees_of_freedom));
   found.move_covariance = normal.llt().solve(Eigen::Matrix3d::Identity());
   found.move = found.move_covariance * (whitened_A.transpose() * whitened_r);
@@ -128,25 +122,28 @@ Verification VerifyBase(const MachineDescription& machine, const std::vector<Mea
   found.refused = std::move(usable.refused);
   std::vector<Measurement> looks;
   for (const std::size_t i : usable.order) {
-    if (run[i].kind == LookKind::kStill) {
+    if (!IsHole(run[i]) && looks.size() < kMostLooks) {
       looks.push_back(run[i]);
     }
   }
   found.looks = looks.size();
-  Innovation line;
-  const bool apart =
-      std::any_of(looks.begin(), looks.end(), [&](const Measurement& m) { return m.mark != looks[0].mark; });
-  if (!apart || !Line(machine, looks, line)) {
+  const bool apart = std::any_of(looks.begin(), looks.end(),
+                                 [&](const Measurement& m) { return m.mark != looks.front().mark; });
+  LookSystem system(machine, Prior::Of(machine.parameters, machine.covariance), looks);
+  if (!apart || !system.Evaluate(system.Start())) {
     found.explanation =
-        std::to_string(looks.size()) + " usable still looks; at least 2 of different marks are needed";
+        std::to_string(looks.size()) + " usable looks; at least 2 of different marks are needed";
     return found;
   }
+  const Innovation line = Line(system);
   Estimate(line, found);
   const double n = static_cast<double>(looks.size());
+  double squared = 0.0;
   for (std::size_t i = 0; i < looks.size(); ++i) {
-    found.mean_shift_C_mm += line.r_mm.segment<2>(static_cast<Eigen::Index>(2 * i)) / n;
+    found.mean_shift_C_mm -= system.row(i).miss_mm / n;
+    squared += system.row(i).miss_mm.squaredNorm();
   }
-  found.rms_mm = std::sqrt(line.r_mm.squaredNorm() / (2.0 * n));
+  found.rms_mm = std::sqrt(squared / (2.0 * n));
   Judge(options, line.reach_mm, found);
   return found;
 }

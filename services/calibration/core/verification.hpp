@@ -1,17 +1,20 @@
 // Compares new looks with what the active version predicts: does the electronic base still stand where it was identified?
 //
-// Model: innovation r = seen - predicted, of covariance S = J C J^T + noise (marks common to their looks); chi-square r^T S^-1 r
-// judges the looks as a whole. A move changes the looks by A (x, y, turn): the main-motion module shifted, the sheet turned
-// against it about the middle of the marks looked at. Its generalised least-squares estimate and covariance (A^T S^-1 A)^-1
-// say by how much, and r^T S^-1 r falls by the estimate's own chi-square of three degrees of freedom. A turn of the module
-// about its own camera moves no mark that stands in the middle of the picture: only a trial hole shows it.
+// Model: innovation r = seen - predicted, of covariance S = J C J^T + noise (marks common to their looks); chi-square r^T
+// S^-1 r judges the looks as a whole. A move changes the looks by A (x, y, turn): the main-motion module shifted, the sheet
+// turned against it about the middle of the marks looked at. Its generalised least-squares estimate and covariance (A^T
+// S^-1 A)^-1 say by how much, and r^T S^-1 r falls by the estimate's own chi-square of three degrees of freedom. A turn of
+// the module about its own camera moves no mark that stands in the middle of the picture: only a trial hole shows it.
 //     MOVED      the move is significant (chance below `false_alarm`) and displaces the sheet under the jet by more than
 //                `tolerance_mm` somewhere among the marks looked at
 //     UNCERTAIN  the version is known too coarsely to tell a move of `tolerance_mm`; or the looks contradict it in a way
 //                that no move explains
 //     PASS       neither
-// Frames: the shift is X_DJ's translation, in D. Units: mm, rad. Threads: pure.
-// Cost: a dense solve of twice the looks. Errors: the verdict TOO_FEW below two usable still looks.
+// Frames: the shift is X_DJ's translation, in D.
+// Units: mm, rad.
+// Threads: pure.
+// Cost: a dense solve of twice the looks.
+// Errors: the verdict TOO_FEW below two usable still looks.
 #pragma once
 
 #include <cstddef>
@@ -50,7 +53,7 @@ struct Verification {
   double rms_mm = 0.0;
 };
 
-// Uses the still looks of the run; the machine's own parameters and covariance are the version compared with.
+// Uses the looks at marks, still and tracking; the machine's own parameters and covariance are the version compared with.
 Verification VerifyBase(const MachineDescription& machine, const std::vector<Measurement>& run,
                         const VerificationOptions& options = {});
 

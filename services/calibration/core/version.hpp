@@ -1,9 +1,12 @@
 // Keeps the order of a machine's versions: who follows whom, what changed, and whether the base drifts.
 //
 // Model: version 0 is as designed; each identification that holds makes one more, child of the version that was active when
-// its looks were taken; activating chooses which version all services use, and rolling back activates the active one's parent.
+// its looks were taken; activating chooses which version all services use, and rolling back activates the active one's
+// parent.
 // Drift: the change of the jet's place on the sheet between two versions, against the covariance of both.
-// Units: the parameters' own; mm. Threads: values. Cost: nothing to speak of.
+// Units: the parameters' own; mm.
+// Threads: values.
+// Cost: nothing to speak of.
 #pragma once
 
 #include <cstdint>

@@ -4,7 +4,8 @@
 // prior of every identification is version 0, as designed: modules are moved between runs, and what an old run said of the
 // base says nothing of the new one. An identification runs on a thread of its own and is an operation with a state that
 // survives a restart (a killed one is FAILED INTERRUPTED).
-// Threads: any. Cost: planning and verifying below some milliseconds; identification some 100 ms on its own thread.
+// Threads: any.
+// Cost: planning and verifying below some milliseconds; identification some 100 ms on its own thread.
 // Errors: NOT_FOUND UNKNOWN_RUN, UNKNOWN_VERSION, UNKNOWN_OPERATION; FAILED_PRECONDITION NO_MACHINE_FILE, OTHER_MACHINE,
 // PLAN_REFUSED reasons of the core; those of the store.
 #pragma once

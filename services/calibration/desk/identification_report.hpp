@@ -1,6 +1,8 @@
 // What is kept of an identification for people and machines, and how it is written down.
 //
-// Units: in the names. Threads: values. Errors: DATA_LOSS STORE_DAMAGED for a text that ReportToText has not written.
+// Units: in the names.
+// Threads: values.
+// Errors: DATA_LOSS STORE_DAMAGED for a text that ReportToText has not written.
 #pragma once
 
 #include <cstdint>

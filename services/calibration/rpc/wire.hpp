@@ -1,6 +1,7 @@
 // Translates between lambdajet.calibration.v1 and the desk.
 //
-// Threads: pure. Errors: FromWire says INVALID_ARGUMENT with every field that is wrong.
+// Threads: pure.
+// Errors: FromWire says INVALID_ARGUMENT with every field that is wrong.
 #pragma once
 
 #include <optional>

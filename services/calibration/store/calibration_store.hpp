@@ -1,8 +1,10 @@
 // Keeps looks, versions and identifications in one SQLite file that survives a kill at any time.
 //
-// Model: SQLite in WAL mode with synchronous=FULL; every call is one transaction: it happened whole or not at all. A plan that
-// is played again gives a new *pass* of the same run: gates rise within a pass. The active version is a row like any other.
-// Units: of the core; numbers keep all their bits. Threads: any; calls take turns.
+// Model: SQLite in WAL mode with synchronous=FULL; every call is one transaction: it happened whole or not at all. A plan
+// that is played again gives a new *pass* of the same run: gates rise within a pass. The active version is a row like any
+// other.
+// Units: of the core; numbers keep all their bits.
+// Threads: any; calls take turns.
 // Errors: RESOURCE_EXHAUSTED DISK_FULL, UNAVAILABLE STORE_IN_USE, DATA_LOSS STORE_DAMAGED, FAILED_PRECONDITION
 // STORE_NOT_WRITABLE or STORE_OF_ANOTHER_BUILD, INTERNAL STORE_FAILED.
 #pragma once
