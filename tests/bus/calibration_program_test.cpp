@@ -46,8 +46,10 @@ class CalibrationProgram : public testing::Test {
     auto bus = Participant::Open(options, nullptr, nullptr);
     EXPECT_TRUE(bus.ok()) << bus.status();
     bus_ = std::move(*bus);
-    machine_file_ = test::SourceDir() + "/deploy/config/machine.yaml";
-    machine_ = *ReadMachineFile(machine_file_);
+    machine_ = *ReadMachineFile(test::SourceDir() + "/deploy/config/machine.yaml");
+    machine_.process.measuring_settle_time_s = 20.0;  // the simulated looks at rest hold no swing
+    machine_file_ = folder_.path() + "/machine.yaml";
+    EXPECT_TRUE(WriteMachineFile(machine_file_, machine_).ok());
     auto reader = Reader<MachineDescriptionPubSubType>::Open(
         *bus_,
         {idl::calibration::v1::MACHINE_DESCRIPTION_TOPIC,
@@ -159,7 +161,7 @@ TEST_F(CalibrationProgram, IdentifiesActivatesAndKeepsItsVersionsThroughKills) {
 
     v1::PlanMeasuringRunResponse planned;
     ASSERT_TRUE(Call(&CalibrationService::Stub::PlanMeasuringRun, *client, {}, planned).ok());
-    EXPECT_THAT(planned.program(), HasSubstr("M100 P"));
+    EXPECT_THAT(planned.program(), HasSubstr("M101 P"));
     EXPECT_THAT(planned.expectation(), HasSubstr("trial pierces"));
     EXPECT_EQ(planned.model_version().machine_id(), "demo-1");
 

@@ -56,7 +56,7 @@ inline MachineDescription PaperSizedMachine() {
     a = {-3000.0, 3000.0, 1000.0, 2000.0, 20000.0};
   }
   m.path = {150.0, 300.0, 500.0, 20000.0, 0.02};
-  m.process.measuring_settle_time_s = 5.0;  // no swing left in the looks at rest
+  m.process.measuring_settle_time_s = 20.0;  // no swing left in the looks at rest
   m.process.pierce_time_s = 0.5;
   m.uncertainties = {0.003, 0.004, 0.005, 0.003, 0.005, 0.005, 0.1};
   m.sheet_width_mm = 500.0;
