@@ -242,14 +242,15 @@ TEST_F(CalibrationProgram, IdentifiesActivatesAndKeepsItsVersionsThroughKills) {
     ASSERT_TRUE(machine.ok()) << machine.status();
     EXPECT_EQ(MachineHash(*machine), active_hash);
 
-    // The base stands; then it moves by 0.2 mm. Playing the plan again is a new pass.
-    std::uint32_t gate = 0;
-    for (const int mark : {1, 3, 5}) Send(simulator.Still(mark), ++gate);
+    // The base stands; then it moves by 0.2 mm. Each time three looks, the gates from 1 again, are a new pass of the plan. Sent
+    // until they are heard: the reader is a new one.
     v1::VerifyBaseRequest verify;
     verify.set_plan_id(kPlan);
     v1::VerifyBaseResponse verdict;
     const auto Verified = [&](const char* wanted) {
       return Eventually([&] {
+        std::uint32_t gate = 0;
+        for (const int mark : {1, 3, 5}) Send(simulator.Still(mark), ++gate);
         return Call(&CalibrationService::Stub::VerifyBase, *client, verify, verdict).ok() &&
                verdict.degrees_of_freedom() == 6 && verdict.verdict() == wanted;
       });
@@ -258,8 +259,6 @@ TEST_F(CalibrationProgram, IdentifiesActivatesAndKeepsItsVersionsThroughKills) {
     ParameterVector moved = simulator.truth();
     moved[calibration::At(Parameter::kBaseXMm)] += 0.2;
     simulator.SetTruth(moved);
-    gate = 0;
-    for (const int mark : {1, 3, 5}) Send(simulator.Still(mark), ++gate);
     EXPECT_TRUE(Verified("MOVED")) << verdict.verdict() << ": " << verdict.message();
     EXPECT_THAT(verdict.message(), HasSubstr("module moved"));
 
