@@ -19,7 +19,7 @@ TEST(MainJob, ReachesItsNumbersOnMachinesItDoesNotKnow) {
       EXPECT_TRUE(cut.cut);
       EXPECT_EQ(cut.not_cut, 0u);
       EXPECT_EQ(cut.missing, 0u);
-      EXPECT_TRUE(cut.holds()) << cut.p95_mm << " found, " << cut.predicted_95_mm << " predicted";
+      EXPECT_TRUE(cut.bound_holds()) << cut.p95_mm << " found, " << cut.predicted_95_mm << " predicted";
     }
     EXPECT_LE(trial.cut(TrialStage::kIdentified).p95_mm, 0.50);
     EXPECT_LE(trial.cut(TrialStage::kCompensated).p95_mm, 0.15);

@@ -137,13 +137,27 @@ std::string FirstFault(const PlannedProgram& planned) {
   return "line " + std::to_string(fault.line) + ": " + std::string(fault.reason) + ": " + fault.message;
 }
 
+void FillWorst(const inspection::Inspection& found, const inspection::Drawing& drawing, CutResult& result) {
+  double largest = -1.0;
+  for (const inspection::Deviation& d : found.deviations) {
+    if (d.cut && std::abs(d.deviation_mm) > largest) {
+      largest = std::abs(d.deviation_mm);
+      result.worst_feature = drawing.features[d.feature].name;
+      result.worst_x_W_mm = d.p_W_mm.x();
+      result.worst_y_W_mm = d.p_W_mm.y();
+    }
+  }
+}
+
 std::string LastWords(const std::vector<ModeChange>& changes) {
-  return changes.empty() ? "nothing"
-                         : std::string(Name(changes.back().to)) + " " + std::string(Name(changes.back().reason));
+  return changes.empty()
+             ? "nothing"
+             : std::string(Name(changes.back().to)) + " " + std::string(Name(changes.back().reason));
 }
 
 std::string WhyNotComplete(const CellRun& run) {
-  return " was not completed: drive " + LastWords(run.drive_changes) + ", main motion " + LastWords(run.main_motion_changes);
+  return " was not completed: drive " + LastWords(run.drive_changes) + ", main motion " +
+         LastWords(run.main_motion_changes);
 }
 
 class Trial {
@@ -200,6 +214,9 @@ class Trial {
     result.max_mm = found.all.max_mm;
     result.not_cut = found.all.not_cut;
     result.missing = path.missing;
+    FillWorst(found, part_.drawing, result);
+    result.holds =
+        static_cast<int>(std::ranges::count(run.drive_changes, ModuleMode::kHolding, &ModeChange::to));
     result.cutting_time_s = path.cutting_time_s;
     result.event_p99_mm = EventP99(run);
     return true;

@@ -37,8 +37,12 @@ struct CutResult {
   std::uint32_t not_cut = 0;
   std::uint64_t missing = 0;
   std::string largest_source;
+  std::string worst_feature;  // where the largest deviation is
+  double worst_x_W_mm = 0.0;
+  double worst_y_W_mm = 0.0;
+  int holds = 0;  // times the drive stopped on the path unasked
 
-  bool holds() const { return cut && p95_mm <= predicted_95_mm; }
+  bool bound_holds() const { return cut && p95_mm <= predicted_95_mm; }
 };
 
 enum class TrialStage { kSetUp, kIdentified, kCompensated };

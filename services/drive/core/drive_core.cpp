@@ -562,7 +562,7 @@ void DriveCore::Act(Action action) {
       positioning_ = true;
       play_.Position(now_ns_, {segment.q_mm[0].value(t), segment.q_mm[1].value(t)},
                      config_.positioning_share * limits_.velocity_mm_per_s,
-                     config_.positioning_share * limits_.acceleration_mm_per_s2);
+                     config_.positioning_acceleration_share * limits_.acceleration_mm_per_s2);
       break;
     }
     case Action::kScheduleStart:

@@ -1,14 +1,17 @@
 // Prints how accurate the whole product is on machines whose truth it does not know: twenty random plants, each cut as set up,
 // identified, and compensated, with the predicted bound beside what the judge found.
 //
-// Usage: twenty_plants [MACHINE_YAML] [PLANTS] [FIRST_SEED]
+// Usage: twenty_plants [MACHINE_YAML] [PLANTS] [FIRST_SEED] [PART], PART as deploy/parts/bracket (its .ngc and
+// .drawing.yaml, the default), or plate: a plate with three holes at the fastest feed
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <vector>
 
+#include "inspection/drawing_file/drawing_file.hpp"
 #include "platform/machine_file/machine_file.hpp"
+#include "platform/process/atomic_file.hpp"
 #include "tests/support/cut_trial.hpp"
 
 namespace lambdajet::tests {
@@ -20,10 +23,12 @@ void PrintPlant(const PlantTrial& trial) {
   for (std::size_t s = 0; s < trial.cuts.size(); ++s) {
     const CutResult& c = trial.cuts[s];
     if (c.cut) {
-      std::printf("%4llu  %-11s  %7.4f  %7.4f  %7.4f  %9.4f  %9.4f  %9.4f  %-5s  %6.1f  %4u  %s\n",
-                  static_cast<unsigned long long>(trial.seed), kStages[s], c.p50_mm, c.p95_mm, c.max_mm,
-                  c.predicted_95_mm, c.predicted_95_linear_mm, c.expected_95_mm, c.holds() ? "yes" : "NO",
-                  c.cutting_time_s, c.not_cut, c.largest_source.c_str());
+      std::printf(
+          "%4llu  %-11s  %7.4f  %7.4f  %7.4f  %9.4f  %9.4f  %9.4f  %-5s  %6.1f  %4u  %-10s  %s %.1f %.1f%s\n",
+          static_cast<unsigned long long>(trial.seed), kStages[s], c.p50_mm, c.p95_mm, c.max_mm,
+          c.predicted_95_mm, c.predicted_95_linear_mm, c.expected_95_mm, c.bound_holds() ? "yes" : "NO",
+          c.cutting_time_s, c.not_cut, c.largest_source.c_str(), c.worst_feature.c_str(), c.worst_x_W_mm,
+          c.worst_y_W_mm, c.holds > 0 ? " HELD" : "");
     }
   }
   if (!trial.trouble.empty()) {
@@ -45,7 +50,7 @@ void PrintSummary(const std::vector<PlantTrial>& trials) {
         p95.push_back(c.p95_mm);
         ratio.push_back(c.predicted_95_mm / c.p95_mm);
         largest = std::max(largest, c.max_mm);
-        holds += c.holds() ? 1 : 0;
+        holds += c.bound_holds() ? 1 : 0;
       }
     }
     std::ranges::sort(p95);
@@ -55,6 +60,20 @@ void PrintSummary(const std::vector<PlantTrial>& trials) {
                   p95[p95.size() / 2], largest, holds, p95.size(), ratio[ratio.size() / 2]);
     }
   }
+}
+
+absl::StatusOr<TrialPart> ReadPart(const std::string& stem) {
+  constexpr std::size_t kMostBytes = 4u << 20;
+  const auto program = ReadWholeFile(stem + ".ngc", kMostBytes);
+  const auto yaml = ReadWholeFile(stem + ".drawing.yaml", kMostBytes);
+  if (!program.ok() || !yaml.ok()) {
+    return program.ok() ? yaml.status() : program.status();
+  }
+  const auto drawing = inspection::ReadDrawing(*yaml);
+  if (!drawing.ok()) {
+    return drawing.status();
+  }
+  return TrialPart{*program, *drawing};
 }
 
 int Run(int argc, char** argv) {
@@ -68,7 +87,15 @@ int Run(int argc, char** argv) {
     std::fprintf(stderr, "%s\n", machine.status().ToString().c_str());
     return 1;
   }
-  const TrialPart part = PlateWithHoles(machine->process.kerf_width_mm, machine->path.feed_mm_per_s);
+  const std::string stem = argc > 4 ? argv[4] : std::string(source ? source : ".") + "/deploy/parts/bracket";
+  const auto chosen = stem == "plate"
+                          ? PlateWithHoles(machine->process.kerf_width_mm, machine->path.feed_mm_per_s)
+                          : ReadPart(stem);
+  if (!chosen.ok()) {
+    std::fprintf(stderr, "%s\n", chosen.status().ToString().c_str());
+    return 1;
+  }
+  const TrialPart& part = *chosen;
   std::printf(
       "seed  stage            p50      p95      max  bound_95   (linear)   (median)  holds  cut_s  not cut  "
       "largest source\n");
