@@ -110,7 +110,7 @@ void Print(const char* name, const Identification& found, const Judgement& j, co
       "1e-3 s^2\n",
       name, looks.size(), found.refused.size(), outliers, j.rms_before, j.rms, j.worst_before, j.worst,
       found.worst_place_mm, found.rms_before_mm, found.rms_after_mm, found.hold_out_after_mm,
-      found.chi_square, found.degrees_of_freedom, found.covariance_inflation, found.tracking_noise,
+      found.chi_square, found.degrees_of_freedom, found.covariance_inflation, found.tracking_noise_ratio,
       1e3 * found.parameters[At(Parameter::kElasticLagS2)],
       truth.levers.moving_mass_kg / truth.levers.stiffness_x_n_per_mm,
       truth.levers.moving_mass_kg / truth.levers.stiffness_y_n_per_mm);

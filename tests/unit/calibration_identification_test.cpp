@@ -195,7 +195,7 @@ TEST_F(IdentificationOf, NoiseBeyondTheSigmasInflatesTheCovariance) {
   }
   const auto found = Identify(machine_, run);
   ASSERT_EQ(found.reason, IdentificationReason::kIdentified) << found.explanation;
-  EXPECT_GT(found.tracking_noise, 4.0);
+  EXPECT_GT(found.tracking_noise_ratio, 4.0);
   EXPECT_LT(found.p_value, 1e-3);
   EXPECT_GT(found.covariance_inflation, 1.1);
 }

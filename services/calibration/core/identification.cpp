@@ -161,8 +161,8 @@ bool Fit::FitWithoutOutliers() {
     }
     NameOutliers(active_);
   }
-  found_.tracking_noise = TrackingNoise();
-  system_.SetTrackingNoise(found_.tracking_noise);
+  found_.tracking_noise_ratio = TrackingNoise();
+  system_.SetTrackingNoise(found_.tracking_noise_ratio);
   for (int round = 0; round < kMostRounds; ++round) {
     if (!GoOn(0.4 + 0.02 * round, "least squares without outliers")) {
       return false;

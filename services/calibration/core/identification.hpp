@@ -66,7 +66,7 @@ struct Identification {
   ParameterVector parameters = ParameterVector::Zero();
   ParameterCovariance covariance = ParameterCovariance::Zero();
   double covariance_inflation = 1.0;
-  double tracking_noise =
+  double tracking_noise_ratio =
       1.0;  // variance of tracking pictures against the stated one, as found and then used
   std::vector<LookResidual> residuals;  // usable looks, by exposure
   std::vector<RefusedLook> refused;

@@ -129,19 +129,19 @@ Verification VerifyBase(const MachineDescription& machine, const std::vector<Mea
   found.looks = looks.size();
   const bool apart = std::any_of(looks.begin(), looks.end(),
                                  [&](const Measurement& m) { return m.mark != looks.front().mark; });
-  LookSystem system(machine, Prior::Of(machine.parameters, machine.covariance), looks);
-  if (!apart || !system.Evaluate(system.Start())) {
+  LookSystem look_system(machine, Prior::Of(machine.parameters, machine.covariance), looks);
+  if (!apart || !look_system.Evaluate(look_system.Start())) {
     found.explanation =
         std::to_string(looks.size()) + " usable looks; at least 2 of different marks are needed";
     return found;
   }
-  const Innovation line = Line(system);
+  const Innovation line = Line(look_system);
   Estimate(line, found);
   const double n = static_cast<double>(looks.size());
   double squared = 0.0;
   for (std::size_t i = 0; i < looks.size(); ++i) {
-    found.mean_shift_C_mm -= system.row(i).miss_mm / n;
-    squared += system.row(i).miss_mm.squaredNorm();
+    found.mean_shift_C_mm -= look_system.row(i).miss_mm / n;
+    squared += look_system.row(i).miss_mm.squaredNorm();
   }
   found.rms_mm = std::sqrt(squared / (2.0 * n));
   Judge(options, line.reach_mm, found);
