@@ -161,6 +161,9 @@ TEST(SegmentBufferLaw, HoldsTheChainInOrderWhateverComes) {
         ASSERT_EQ(answer, SegmentAnswer::kTaken);
       }
       ASSERT_LE(buffer.next_index() - buffer.first_index(), 256u);
+      if (buffer.empty()) {
+        continue;  // what came first was out of order and refused
+      }
       ASSERT_LE(buffer.end_tau_s() - playing, 2.0 + 0.05);
       const std::uint32_t found = buffer.Find(playing, static_cast<std::uint32_t>(dice.Below(3000)));
       ASSERT_TRUE(buffer.Holds(found));
