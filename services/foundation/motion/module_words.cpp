@@ -6,15 +6,31 @@
 namespace lambdajet {
 namespace {
 
-constexpr std::array<std::string_view, 13> kModes = {"OFF",     "INITIALISING", "SAFE",     "READY",    "ARMED",
-                                                     "RUNNING", "HOLDING",      "HELD",     "RESUMING", "COMPLETE",
-                                                     "STOPPING", "STOPPED",     "FAULT"};
-constexpr std::array<std::string_view, 13> kVerbs = {"NONE",    "LOAD",     "ARM",  "START", "HOLD", "RESUME", "RETRACE",
-                                                     "OVERRIDE", "STOP",    "RESET", "HOME", "UNLOAD", "JOG"};
-constexpr std::array<std::string_view, 19> kReasons = {
-    "NONE",        "COMMANDED",       "PEER_LOST",      "PEER_STOPPED", "STARVED",     "RESTARTED",     "NOT_REFERENCED",
-    "WRONG_MODE",  "WRONG_PLAN",      "FOLLOWING_ERROR", "ACTUATOR_LIMIT", "OVERRUNS", "CLOCK_OFFSET",  "TWO_WRITERS",
-    "PRESSURE_LOST", "SENSOR_FAULT",  "NO_MACHINE_DESCRIPTION", "GATE_TIMEOUT", "STALE_COMMAND"};
+constexpr std::array<std::string_view, 13> kModes = {
+    "OFF",  "INITIALISING", "SAFE",     "READY",    "ARMED",   "RUNNING", "HOLDING",
+    "HELD", "RESUMING",     "COMPLETE", "STOPPING", "STOPPED", "FAULT"};
+constexpr std::array<std::string_view, 13> kVerbs = {"NONE",   "LOAD",    "ARM",      "START", "HOLD",
+                                                     "RESUME", "RETRACE", "OVERRIDE", "STOP",  "RESET",
+                                                     "HOME",   "UNLOAD",  "JOG"};
+constexpr std::array<std::string_view, 19> kReasons = {"NONE",
+                                                       "COMMANDED",
+                                                       "PEER_LOST",
+                                                       "PEER_STOPPED",
+                                                       "STARVED",
+                                                       "RESTARTED",
+                                                       "NOT_REFERENCED",
+                                                       "WRONG_MODE",
+                                                       "WRONG_PLAN",
+                                                       "FOLLOWING_ERROR",
+                                                       "ACTUATOR_LIMIT",
+                                                       "OVERRUNS",
+                                                       "CLOCK_OFFSET",
+                                                       "TWO_WRITERS",
+                                                       "PRESSURE_LOST",
+                                                       "SENSOR_FAULT",
+                                                       "NO_MACHINE_DESCRIPTION",
+                                                       "GATE_TIMEOUT",
+                                                       "STALE_COMMAND"};
 
 template <std::size_t N>
 std::string_view At(const std::array<std::string_view, N>& names, std::uint32_t index) {

@@ -11,22 +11,46 @@
 namespace lambdajet {
 
 enum class ModuleMode : std::uint32_t {
-  kOff, kInitialising, kSafe, kReady, kArmed, kRunning, kHolding, kHeld, kResuming, kComplete, kStopping, kStopped, kFault
+  kOff,
+  kInitialising,
+  kSafe,
+  kReady,
+  kArmed,
+  kRunning,
+  kHolding,
+  kHeld,
+  kResuming,
+  kComplete,
+  kStopping,
+  kStopped,
+  kFault
 };
 
 enum class Verb : std::uint32_t {
-  kNone, kLoad, kArm, kStart, kHold, kResume, kRetrace, kOverride, kStop, kReset, kHome, kUnload, kJog
+  kNone,
+  kLoad,
+  kArm,
+  kStart,
+  kHold,
+  kResume,
+  kRetrace,
+  kOverride,
+  kStop,
+  kReset,
+  kHome,
+  kUnload,
+  kJog
 };
 
 enum class ModuleReason : std::uint32_t {
   kNone,
-  kCommanded,              // an operator, MES or CAM asked for it
-  kPeerLost,               // the other module's state did not come in time
-  kPeerStopped,            // the other module stands in STOPPED, FAULT or SAFE
-  kStarved,                // the buffer would have run out
-  kRestarted,              // the node started anew: reference before motion
+  kCommanded,    // an operator, MES or CAM asked for it
+  kPeerLost,     // the other module's state did not come in time
+  kPeerStopped,  // the other module stands in STOPPED, FAULT or SAFE
+  kStarved,      // the buffer would have run out
+  kRestarted,    // the node started anew: reference before motion
   kNotReferenced,
-  kWrongMode,              // the command does not fit the mode
+  kWrongMode,  // the command does not fit the mode
   kWrongPlan,
   kFollowingError,
   kActuatorLimit,
