@@ -348,6 +348,7 @@ PlannedProgram PlanPartProgram(std::string_view program, const MachineDescriptio
     return result;
   }
   const ProgramPath path = MakeProgramPath(read.operations, DefaultsOf(machine, options));
+  std::vector<Operation>().swap(read.operations);  // a long program's list is not held while it is planned
   PlaceCheck(machine, result.faults).Check(path);
   if (!result.faults.empty()) {
     return result;

@@ -32,6 +32,43 @@ void Append(std::string& text, const char* key, double value) {
   text += number;
 }
 
+void AppendEnd(std::string& text, const Operation& o) {
+  const std::array<double, 6> end = {o.x_W_mm, o.y_W_mm, o.z_W_mm, o.a_rad, o.b_rad, o.c_rad};
+  static constexpr std::array<const char*, 6> kKeys = {"x_mm", "y_mm", "z_mm", "a_rad", "b_rad", "c_rad"};
+  for (std::size_t i = 0; i < end.size(); ++i) {
+    if ((o.axes >> i & 1u) != 0) {
+      Append(text, kKeys[i], end[i]);
+    }
+  }
+}
+
+void AppendArc(std::string& text, const Operation& o) {
+  if (o.plane != ArcPlane::kYz) {
+    Append(text, "center_x_mm", o.center_x_W_mm);
+  }
+  if (o.plane != ArcPlane::kZx) {
+    Append(text, "center_y_mm", o.center_y_W_mm);
+  }
+  if (o.plane != ArcPlane::kXy) {
+    Append(text, "center_z_mm", o.center_z_W_mm);
+  }
+  Append(text, "sweep_rad", o.sweep_rad);
+}
+
+void AppendFeed(std::string& text, const Operation& o) {
+  if (o.value != 0.0) {
+    Append(text, "time_s", o.value);
+  } else {
+    Append(text, "feed_mm_per_s", o.feed_mm_per_s);
+  }
+}
+
+void AppendKerf(std::string& text, const Operation& o) {
+  if (o.kerf_offset_mm != 0.0) {
+    Append(text, "kerf_offset_mm", o.kerf_offset_mm);
+  }
+}
+
 }  // namespace
 
 std::string_view OperationName(OperationKind kind) { return kNames[static_cast<std::size_t>(kind)]; }
@@ -40,29 +77,26 @@ std::string FormatOperation(const Operation& o) {
   std::string text = std::to_string(o.line) + " " + std::string(OperationName(o.kind));
   switch (o.kind) {
     case OperationKind::kFeedArc:
-      Append(text, "x_mm", o.x_W_mm);
-      Append(text, "y_mm", o.y_W_mm);
-      Append(text, "center_x_mm", o.center_x_W_mm);
-      Append(text, "center_y_mm", o.center_y_W_mm);
-      Append(text, "sweep_rad", o.sweep_rad);
-      Append(text, "feed_mm_per_s", o.feed_mm_per_s);
+      AppendEnd(text, o);
+      AppendArc(text, o);
+      AppendFeed(text, o);
+      AppendKerf(text, o);
       break;
     case OperationKind::kFeedLine:
-      Append(text, "x_mm", o.x_W_mm);
-      Append(text, "y_mm", o.y_W_mm);
-      Append(text, "feed_mm_per_s", o.feed_mm_per_s);
+      AppendEnd(text, o);
+      AppendFeed(text, o);
+      AppendKerf(text, o);
       break;
     case OperationKind::kTraverse:
-      Append(text, "x_mm", o.x_W_mm);
-      Append(text, "y_mm", o.y_W_mm);
+      AppendEnd(text, o);
+      AppendKerf(text, o);
       break;
     case OperationKind::kFeedChange:
       Append(text, "feed_mm_per_s", o.feed_mm_per_s);
       break;
     case OperationKind::kWorkOffsetChange:
       Append(text, "g", o.value);
-      Append(text, "x_mm", o.x_W_mm);
-      Append(text, "y_mm", o.y_W_mm);
+      AppendEnd(text, o);
       break;
     case OperationKind::kDwell:
     case OperationKind::kPierce:

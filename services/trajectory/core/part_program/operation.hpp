@@ -2,7 +2,8 @@
 //
 // Model: the canonical operations of RS-274/NGC as far as a jet that stands still and a sheet that moves have them; units,
 // distance modes, offsets and scaling of the program are resolved, so that every coordinate is in W.
-// Frames: W. Units: mm, mm/s, s, rad. Threads: values. Cost: 80 bytes an operation.
+// Frames: W; a machine without an axis leaves its coordinate at 0. Units: mm, mm/s, s, rad. Threads: values. Cost: 112 bytes
+// an operation.
 #pragma once
 
 #include <cstdint>
@@ -37,16 +38,43 @@ enum class OperationKind : std::uint8_t {
 // UPPER_SNAKE.
 std::string_view OperationName(OperationKind kind);
 
+// The plane an arc turns in; a helix moves along the plane's normal as it turns.
+enum class ArcPlane : std::uint8_t {
+  kXy,  // G17, normal Z
+  kZx,  // G18, normal Y
+  kYz,  // G19, normal X
+};
+
+// Which coordinates an operation speaks of: the axes of the machine the program was read for, one bit each.
+enum AxisBit : std::uint8_t {
+  kAxisX = 1,
+  kAxisY = 2,
+  kAxisZ = 4,
+  kAxisA = 8,
+  kAxisB = 16,
+  kAxisC = 32,
+};
+inline constexpr std::uint8_t kPlanarAxes = kAxisX | kAxisY;
+inline constexpr std::uint8_t kSixAxes = 63;
+
 struct Operation {
   OperationKind kind = OperationKind::kEnd;
+  ArcPlane plane = ArcPlane::kXy;  // arc
+  std::uint8_t axes = kPlanarAxes;
   std::uint32_t line = 0;  // of the program, 1 is the first
   double x_W_mm = 0.0;     // end of a motion
   double y_W_mm = 0.0;
-  double center_x_W_mm = 0.0;  // arc
+  double z_W_mm = 0.0;
+  double a_rad = 0.0;  // end of a motion: the programmed rotary words, about X, Y, Z
+  double b_rad = 0.0;
+  double c_rad = 0.0;
+  double center_x_W_mm = 0.0;  // arc; along the plane's normal the centre is not used
   double center_y_W_mm = 0.0;
-  double sweep_rad = 0.0;      // arc: counter-clockwise positive
-  double feed_mm_per_s = 0.0;  // feed line, arc and change
-  double value = 0.0;
+  double center_z_W_mm = 0.0;
+  double sweep_rad = 0.0;       // arc: counter-clockwise positive, seen against the plane's normal
+  double feed_mm_per_s = 0.0;   // feed line, arc and change: along the path in X, Y, Z
+  double kerf_offset_mm = 0.0;  // motion: signed offset of the jet from the programmed contour, left positive
+  double value = 0.0;           // as its kind says; feed line and arc: s, where it has a duration and no feed
 };
 
 // Something in a program that is not understood or cannot be done.
