@@ -12,6 +12,7 @@
 #include <string>
 
 #include "tests/laws/trajectory_cases.hpp"
+#include "tests/laws/trajectory_spatial_reference.hpp"
 #include "trajectory/core/feed/plan_program.hpp"
 #include "trajectory/core/feed/plan_samples.hpp"
 #include "trajectory/core/feed/run_profile.hpp"
@@ -149,6 +150,32 @@ void PathTiming() {
       1e9 * seconds / static_cast<double>(nodes.size()), nodes.size());
 }
 
+// N actuators on random smooth paths, against the plain reference: time a grid point on the same grid, duration against the
+// reference on a grid ten times finer.
+template <std::size_t N>
+void PathTimingOf() {
+  constexpr std::size_t kCells = 20'000;
+  std::mt19937_64 random(11);
+  double ours_s = 0.0, plain_s = 0.0, worst = 0.0;
+  constexpr int kPaths = 5;
+  for (int i = 0; i < kPaths; ++i) {
+    const TimedPath<N> path = TimedPath<N>::Random(random, 1000.0);
+    const std::vector<ProfileNodeOf<N>> nodes = path.Nodes(kCells);
+    std::vector<ProfileNodeOf<N>> solved = nodes;
+    ours_s += Seconds([&] { SolveSpeedProfile(solved, path.bounds, 0.0, 0.0); }, 10);
+    double duration = 0.0;
+    plain_s += Seconds([&] { duration = ReferenceDuration(nodes, path.bounds); }, 1);
+    const double fine = ReferenceDuration(path.Nodes(10 * kCells), path.bounds);
+    worst = std::max(worst, std::abs(ProfileDuration(solved) / fine - 1.0));
+  }
+  const double points = static_cast<double>(kPaths * (kCells + 1));
+  std::printf(
+      "path timing of %zu actuators, random paths: %.0f ns a grid point; plain reference %.0f ns (ratio "
+      "%.0f); durations "
+      "differ by at most %.1e\n",
+      N, 1e9 * ours_s / points, 1e9 * plain_s / points, plain_s / ours_s, worst);
+}
+
 // A long square with jerk made inactive: against the bound that starts, corners and stops at standstill cost.
 void AgainstBound() {
   MachineDescription m = DemoLikeMachine();
@@ -231,6 +258,8 @@ int main(int count, char** words) {
   using namespace lambdajet::trajectory;
   Reading();
   PathTiming();
+  PathTimingOf<2>();
+  PathTimingOf<6>();
   FeedHeld("circle R20", CircleOfShortBlocks(20000, 20, 0.02, 6000), 20);
   FeedHeld("figure-eight R20", FigureEight(20000, 20, 0.02, 6000), 20);
   AgainstBound();

@@ -42,6 +42,21 @@ constexpr std::array<LimitKey, 5> kLimitKeys = {{{"strut_min_mm", &HexapodLimits
                                                  {"platform_cone_rad", &HexapodLimits::platform_cone_rad},
                                                  {"singular_margin", &HexapodLimits::singular_margin}}};
 
+struct MotionKey {
+  const char* name;
+  double HexapodMotion::*member;
+};
+constexpr std::array<MotionKey, 9> kMotionKeys = {
+    {{"strut_velocity_mm_per_s", &HexapodMotion::strut_velocity_mm_per_s},
+     {"strut_acceleration_mm_per_s2", &HexapodMotion::strut_acceleration_mm_per_s2},
+     {"strut_jerk_mm_per_s3", &HexapodMotion::strut_jerk_mm_per_s3},
+     {"feed_mm_per_s", &HexapodMotion::feed_mm_per_s},
+     {"rapid_mm_per_s", &HexapodMotion::rapid_mm_per_s},
+     {"path_acceleration_mm_per_s2", &HexapodMotion::path_acceleration_mm_per_s2},
+     {"path_jerk_mm_per_s3", &HexapodMotion::path_jerk_mm_per_s3},
+     {"corner_tolerance_mm", &HexapodMotion::corner_tolerance_mm},
+     {"corner_tolerance_rad", &HexapodMotion::corner_tolerance_rad}}};
+
 Pose ReadPose(MapReader& file, const std::string& key, Findings& findings) {
   MapReader reader(file.Child(key), key + ".", findings);
   const Eigen::Vector3d p(reader.Number("x_mm"), reader.Number("y_mm"), reader.Number("z_mm"));
@@ -103,6 +118,11 @@ HexapodMachine ReadAll(const YAML::Node& root, Findings& findings) {
     machine.geometry.limits.*key.member = limits.Number(key.name);
   }
   machine.geometry.screw_lead_mm = file.Number("screw_lead_mm");
+  MapReader motion(file.Child("motion"), "motion.", findings);
+  for (const MotionKey& key : kMotionKeys) {
+    machine.motion.*key.member = motion.Number(key.name);
+  }
+  machine.motion.X_MT_zero = ReadPose(file, "program_zero", findings);
   return machine;
 }
 
@@ -131,6 +151,9 @@ absl::StatusOr<HexapodMachine> ParseHexapod(const std::string& yaml, const std::
     LayJointFrames(machine.geometry);
     if (const std::string_view fault = FaultOf(machine.geometry); !fault.empty()) {
       findings.Add("the hexapod", 0, "cannot be: " + std::string(fault), "WRONG_VALUE");
+    }
+    if (const std::string_view fault = FaultOf(machine.motion); !fault.empty()) {
+      findings.Add("the hexapod's motion", 0, "cannot be: " + std::string(fault), "WRONG_VALUE");
     }
   }
   if (absl::Status status = findings.status("BAD_HEXAPOD_FILE"); !status.ok()) {
@@ -165,7 +188,11 @@ std::string HexapodText(const HexapodMachine& machine) {
   for (const LimitKey& key : kLimitKeys) {
     text += std::string("  ") + key.name + ": " + ShortestText(g.limits.*key.member) + "\n";
   }
-  return text + "screw_lead_mm: " + ShortestText(g.screw_lead_mm) + "\n";
+  text += "screw_lead_mm: " + ShortestText(g.screw_lead_mm) + "\nmotion:\n";
+  for (const MotionKey& key : kMotionKeys) {
+    text += std::string("  ") + key.name + ": " + ShortestText(machine.motion.*key.member) + "\n";
+  }
+  return text + PoseText("program_zero", machine.motion.X_MT_zero);
 }
 
 }  // namespace lambdajet

@@ -1,4 +1,4 @@
-// Reads and writes the YAML file that describes one hexapod (foundation/machine/hexapod_geometry.hpp).
+// Reads and writes the YAML file that describes one hexapod (foundation/machine/hexapod_geometry.hpp, hexapod_motion.hpp).
 //
 // Model: every key is required but a strut's `joint`; a strut without it has a perfect universal joint. The joint frames are
 // laid by LayJointFrames from the file's joint centres and home. Poses are x_mm, y_mm, z_mm and the Krylov angles of
@@ -12,12 +12,14 @@
 
 #include "absl/status/statusor.h"
 #include "foundation/machine/hexapod_geometry.hpp"
+#include "foundation/machine/hexapod_motion.hpp"
 
 namespace lambdajet {
 
 struct HexapodMachine {
   std::string machine_id;
   HexapodGeometry geometry;
+  HexapodMotion motion;
 };
 
 absl::StatusOr<HexapodMachine> ReadHexapodFile(const std::string& path);

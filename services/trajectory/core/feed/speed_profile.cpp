@@ -7,36 +7,33 @@
 namespace lambdajet::trajectory {
 namespace {
 
-// A node's bounds with the slope of each actuator made positive: |slope u + bend x| <= limit.
+constexpr double kNone = std::numeric_limits<double>::infinity();
+
+// One actuator's bound with its slope made positive: |slope u + bend x| <= limit.
 struct ActuatorRow {
   double slope = 0.0;
   double bend = 0.0;
   double limit = 0.0;
 };
 
-ActuatorRow RowOf(const ProfileNode& node, const ActuatorBounds& bounds, std::size_t j) {
+template <std::size_t N>
+ActuatorRow RowOf(const ProfileNodeOf<N>& node, const ActuatorBoundsOf<N>& bounds, std::size_t j) {
   const double sign = node.A[j] < 0.0 ? -1.0 : 1.0;
   return {sign * node.A[j], sign * node.B[j], bounds.acceleration_mm_per_s2[j]};
 }
 
-void Lower(ProfileNode& node, double x, FeedLimit reason) {
+template <std::size_t N>
+void Lower(ProfileNodeOf<N>& node, double x, FeedLimit reason) {
   if (x < node.x) {
     node.x = x;
     node.binding = reason;
   }
 }
 
-constexpr FeedLimit VelocityLimit(std::size_t j) {
-  return j == 0 ? FeedLimit::kActuator1Velocity : FeedLimit::kActuator2Velocity;
-}
-constexpr FeedLimit AccelerationLimit(std::size_t j) {
-  return j == 0 ? FeedLimit::kActuator1Acceleration : FeedLimit::kActuator2Acceleration;
-}
-
 // Largest x for which some u meets both the path's circle and the actuator's strip.
 double CircleAndStrip(double a, double k, const ActuatorRow& row) {
   if (row.limit >= std::abs(row.slope) * a && row.bend == 0.0) {
-    return std::numeric_limits<double>::infinity();
+    return kNone;
   }
   const double b = std::abs(row.bend);
   const double s = row.slope;
@@ -45,37 +42,67 @@ double CircleAndStrip(double a, double k, const ActuatorRow& row) {
   const double q = b * row.limit;
   const double r = row.limit * row.limit - s * s * a * a;
   const double d = q * q - p * r;
-  return p > 0.0 && d >= 0.0 ? (q + std::sqrt(d)) / p : std::numeric_limits<double>::infinity();
+  return p > 0.0 && d >= 0.0 ? (q + std::sqrt(d)) / p : kNone;
+}
+
+// Largest x for which two strips share a u: |b1/s1 - b2/s2| x <= l1/s1 + l2/s2.
+double StripAndStrip(const ActuatorRow& first, const ActuatorRow& second) {
+  const double apart = std::abs(first.bend * second.slope - second.bend * first.slope);
+  const double room = first.limit * second.slope + second.limit * first.slope;
+  return apart > 0.0 ? room / apart : kNone;
+}
+
+// Whether some u meets all bounds at the node's x: the fast answer for nearly every node.
+template <std::size_t N>
+bool HasAcceleration(const ProfileNodeOf<N>& node, const ActuatorBoundsOf<N>& bounds) {
+  const double x = node.x, normal = node.curvature * x;
+  const double room2 = node.acceleration_mm_per_s2 * node.acceleration_mm_per_s2 - normal * normal;
+  const double along = std::sqrt(std::max(0.0, room2));
+  double from = -along, to = along;
+  bool bent = false;
+  for (std::size_t j = 0; j < N; ++j) {
+    const double limit = bounds.acceleration_mm_per_s2[j], b = node.B[j] * x;
+    const double slope = std::abs(node.A[j]), at = node.A[j] < 0.0 ? -b : b;
+    const double inverse = 1.0 / std::max(slope, 1e-12);
+    from = std::max(from, (-limit - at) * inverse);
+    to = std::min(to, (limit - at) * inverse);
+    bent |= slope < 1e-12 && std::abs(b) > limit;
+  }
+  return from <= to && !bent;
 }
 
 // The maximum velocity curve at a node.
-void CapNode(ProfileNode& node, const ActuatorBounds& bounds) {
+template <std::size_t N>
+void CapNode(ProfileNodeOf<N>& node, const ActuatorBoundsOf<N>& bounds) {
   node.x = node.speed_cap_mm_per_s * node.speed_cap_mm_per_s;
   node.binding = node.cap_reason;
   const double a = node.acceleration_mm_per_s2;
-  if (node.curvature > 0.0) {
+  if (node.curvature * node.x > a) {
     Lower(node, a / node.curvature, FeedLimit::kCurvature);
   }
-  const ActuatorRow first = RowOf(node, bounds, 0), second = RowOf(node, bounds, 1);
-  for (std::size_t j = 0; j < 2; ++j) {
-    const double slope = std::abs(node.A[j]);
+  for (std::size_t j = 0; j < N; ++j) {
+    const double slope2 = node.A[j] * node.A[j];
     const double v = bounds.velocity_mm_per_s[j];
-    if (slope * slope * node.x > v * v) {
-      Lower(node, v * v / (slope * slope), VelocityLimit(j));
+    if (slope2 * node.x > v * v) {
+      Lower(node, v * v / slope2, ActuatorVelocityLimit(j));
     }
-    Lower(node, CircleAndStrip(a, node.curvature, j == 0 ? first : second), AccelerationLimit(j));
   }
-  // Both strips share a u only if |b1/s1 - b2/s2| x <= l1/s1 + l2/s2.
-  const double apart = std::abs(first.bend * second.slope - second.bend * first.slope);
-  const double room = first.limit * second.slope + second.limit * first.slope;
-  if (apart * node.x > room) {
-    Lower(node, room / apart, FeedLimit::kActuator1Acceleration);
+  if (HasAcceleration(node, bounds)) {
+    return;
+  }
+  for (std::size_t j = 0; j < N; ++j) {
+    const ActuatorRow row = RowOf(node, bounds, j);
+    Lower(node, CircleAndStrip(a, node.curvature, row), ActuatorAccelerationLimit(j));
+    for (std::size_t i = 0; i < j; ++i) {
+      Lower(node, StripAndStrip(RowOf(node, bounds, i), row), ActuatorAccelerationLimit(i));
+    }
   }
 }
 
 // Largest x at the cell's start from which u at its lower bound still reaches x_next or less.
-double Backward(const ProfileNode& node, const ActuatorBounds& bounds, double cell_mm, double x_next,
-                FeedLimit& reason) {
+template <std::size_t N>
+double Backward(const ProfileNodeOf<N>& node, const ActuatorBoundsOf<N>& bounds, double cell_mm,
+                double x_next, FeedLimit& reason) {
   const double a = node.acceleration_mm_per_s2;
   const double c = 2.0 * cell_mm * node.curvature;
   const double reach = 2.0 * cell_mm * a;
@@ -84,33 +111,65 @@ double Backward(const ProfileNode& node, const ActuatorBounds& bounds, double ce
   x = std::max(x, std::min(x_next, node.x));
   reason = FeedLimit::kPathAcceleration;
   const double h = 0.5 / cell_mm;
-  for (std::size_t j = 0; j < 2; ++j) {
-    const ActuatorRow row = RowOf(node, bounds, j);
-    const double slope = row.slope * h - row.bend;
-    if (slope > 0.0) {
-      const double limit = (row.limit + row.slope * h * x_next) / slope;
-      if (limit < x) {
-        x = limit;
-        reason = AccelerationLimit(j);
-      }
+  // limit + s h x_next >= (s h - b) x; only a bound that x breaks is worth a division.
+  for (std::size_t j = 0; j < N; ++j) {
+    const double A = node.A[j], step = std::abs(A) * h;
+    const double slope = step - (A < 0.0 ? -node.B[j] : node.B[j]);
+    const double room = bounds.acceleration_mm_per_s2[j] + step * x_next;
+    if (slope * x > room) {
+      x = room / slope;
+      reason = ActuatorAccelerationLimit(j);
     }
   }
   return x;
 }
 
-double LargestAcceleration(const ProfileNode& node, const ActuatorBounds& bounds, FeedLimit& reason) {
+template <std::size_t N>
+double LargestAcceleration(const ProfileNodeOf<N>& node, const ActuatorBoundsOf<N>& bounds,
+                           FeedLimit& reason) {
   const double normal = node.curvature * node.x;
   const double a = node.acceleration_mm_per_s2;
   double u = std::sqrt(std::max(0.0, a * a - normal * normal));
   reason = FeedLimit::kPathAcceleration;
-  for (std::size_t j = 0; j < 2; ++j) {
-    const ActuatorRow row = RowOf(node, bounds, j);
-    if (row.slope * u + row.bend * node.x > row.limit && row.slope > 0.0) {
-      u = (row.limit - row.bend * node.x) / row.slope;
-      reason = AccelerationLimit(j);
+  for (std::size_t j = 0; j < N; ++j) {
+    const double A = node.A[j], slope = std::abs(A), bend = A < 0.0 ? -node.B[j] : node.B[j];
+    if (slope * u + bend * node.x > bounds.acceleration_mm_per_s2[j] && slope > 0.0) {
+      u = (bounds.acceleration_mm_per_s2[j] - bend * node.x) / slope;
+      reason = ActuatorAccelerationLimit(j);
     }
   }
   return u;
+}
+
+template <std::size_t N>
+void Solve(std::vector<ProfileNodeOf<N>>& nodes, const ActuatorBoundsOf<N>& bounds,
+           double begin_speed_mm_per_s, double end_speed_mm_per_s) {
+  CapNode(nodes.back(), bounds);
+  Lower(nodes.back(), end_speed_mm_per_s * end_speed_mm_per_s, FeedLimit::kPathAcceleration);
+  for (std::size_t i = nodes.size() - 1; i-- > 0;) {
+    CapNode(nodes[i], bounds);
+    FeedLimit reason;
+    const double cell = nodes[i + 1].offset_mm - nodes[i].offset_mm;
+    const double x = Backward(nodes[i], bounds, cell, nodes[i + 1].x, reason);
+    Lower(nodes[i], x, reason);
+  }
+  Lower(nodes.front(), begin_speed_mm_per_s * begin_speed_mm_per_s, FeedLimit::kPathAcceleration);
+  for (std::size_t i = 0; i + 1 < nodes.size(); ++i) {
+    FeedLimit reason;
+    const double u = LargestAcceleration(nodes[i], bounds, reason);
+    const double cell = nodes[i + 1].offset_mm - nodes[i].offset_mm;
+    Lower(nodes[i + 1], std::max(0.0, nodes[i].x + 2.0 * cell * u), reason);
+  }
+}
+
+template <std::size_t N>
+double Duration(const std::vector<ProfileNodeOf<N>>& nodes) {
+  double time = 0.0;
+  for (std::size_t i = 0; i + 1 < nodes.size(); ++i) {
+    const double v = std::sqrt(nodes[i].x) + std::sqrt(nodes[i + 1].x);
+    time += 2.0 * (nodes[i + 1].offset_mm - nodes[i].offset_mm) / v;
+  }
+  return time;
 }
 
 }  // namespace
@@ -127,38 +186,40 @@ std::string_view FeedLimitName(FeedLimit limit) {
                                                                            "CONTOUR_TOLERANCE",
                                                                            "PREDICTED_ERROR",
                                                                            "ACTUATOR_JERK",
-                                                                           "PATH_JERK"};
+                                                                           "PATH_JERK",
+                                                                           "ACTUATOR_3_VELOCITY",
+                                                                           "ACTUATOR_4_VELOCITY",
+                                                                           "ACTUATOR_5_VELOCITY",
+                                                                           "ACTUATOR_6_VELOCITY",
+                                                                           "ACTUATOR_3_ACCELERATION",
+                                                                           "ACTUATOR_4_ACCELERATION",
+                                                                           "ACTUATOR_5_ACCELERATION",
+                                                                           "ACTUATOR_6_ACCELERATION"};
   return kNames[static_cast<std::size_t>(limit)];
+}
+
+FeedLimit ActuatorVelocityLimit(std::size_t j) {
+  const FeedLimit first = j < 2 ? FeedLimit::kActuator1Velocity : FeedLimit::kActuator3Velocity;
+  return static_cast<FeedLimit>(static_cast<std::size_t>(first) + (j < 2 ? j : j - 2));
+}
+
+FeedLimit ActuatorAccelerationLimit(std::size_t j) {
+  const FeedLimit first = j < 2 ? FeedLimit::kActuator1Acceleration : FeedLimit::kActuator3Acceleration;
+  return static_cast<FeedLimit>(static_cast<std::size_t>(first) + (j < 2 ? j : j - 2));
 }
 
 void SolveSpeedProfile(std::vector<ProfileNode>& nodes, const ActuatorBounds& bounds,
                        double begin_speed_mm_per_s, double end_speed_mm_per_s) {
-  for (ProfileNode& node : nodes) {
-    CapNode(node, bounds);
-  }
-  Lower(nodes.back(), end_speed_mm_per_s * end_speed_mm_per_s, FeedLimit::kPathAcceleration);
-  for (std::size_t i = nodes.size() - 1; i-- > 0;) {
-    FeedLimit reason;
-    const double cell = nodes[i + 1].offset_mm - nodes[i].offset_mm;
-    const double x = Backward(nodes[i], bounds, cell, nodes[i + 1].x, reason);
-    Lower(nodes[i], x, reason);
-  }
-  Lower(nodes.front(), begin_speed_mm_per_s * begin_speed_mm_per_s, FeedLimit::kPathAcceleration);
-  for (std::size_t i = 0; i + 1 < nodes.size(); ++i) {
-    FeedLimit reason;
-    const double u = LargestAcceleration(nodes[i], bounds, reason);
-    const double cell = nodes[i + 1].offset_mm - nodes[i].offset_mm;
-    Lower(nodes[i + 1], std::max(0.0, nodes[i].x + 2.0 * cell * u), reason);
-  }
+  Solve(nodes, bounds, begin_speed_mm_per_s, end_speed_mm_per_s);
 }
 
-double ProfileDuration(const std::vector<ProfileNode>& nodes) {
-  double time = 0.0;
-  for (std::size_t i = 0; i + 1 < nodes.size(); ++i) {
-    const double v = std::sqrt(nodes[i].x) + std::sqrt(nodes[i + 1].x);
-    time += 2.0 * (nodes[i + 1].offset_mm - nodes[i].offset_mm) / v;
-  }
-  return time;
+void SolveSpeedProfile(std::vector<ProfileNodeOf<6>>& nodes, const ActuatorBoundsOf<6>& bounds,
+                       double begin_speed_mm_per_s, double end_speed_mm_per_s) {
+  Solve(nodes, bounds, begin_speed_mm_per_s, end_speed_mm_per_s);
 }
+
+double ProfileDuration(const std::vector<ProfileNode>& nodes) { return Duration(nodes); }
+
+double ProfileDuration(const std::vector<ProfileNodeOf<6>>& nodes) { return Duration(nodes); }
 
 }  // namespace lambdajet::trajectory
