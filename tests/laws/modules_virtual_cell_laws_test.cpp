@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <optional>
 #include <random>
 #include <vector>
@@ -42,62 +43,70 @@ Plan TwoCircles(const MachineDescription& machine, double speed_mm_per_s = 100.0
   return plan.Finish(77);
 }
 
-// How far a set-point lies from the plan's curve q(tau), looked for near where the last one was.
+// How far a set-point lies from the plan's curve q(tau): the least over the whole plan, by bisection with a bound on how far
+// the curve gets from an interval's middle. A search from where the last one was found is not enough: at a corner crossed at
+// rest it stays on the wrong leg.
 class CurveDistance {
  public:
   explicit CurveDistance(const Plan& plan) : plan_(plan) {}
 
   double operator()(const std::array<double, kActuatorCount>& q) {
-    const double near = Near(q);
-    if (near <= 1e-9) {
-      return near;
-    }
-    // Lost sight of it (a corner, a loop of the path): looks along the whole plan.
-    double best = near;
-    for (double tau = 0.0; tau <= plan_.duration_s; tau += 0.02) {
-      tau_ = tau;
-      if (At(tau, q) < 25.0) {
-        best = std::min(best, Near(q));
-      }
+    double best = 1e9;
+    for (std::size_t k = 0; k < plan_.segments.size() && best > kSurelyOn_mm; ++k) {
+      const std::size_t i = (last_ + k) % plan_.segments.size();
+      const double half = 0.5 * plan_.segments[i].duration_s;
+      const double before = best;
+      Bisect(plan_.segments[i], q, half, half, best);
+      last_ = best < before && best <= kSurelyOn_mm ? i : last_;
     }
     return best;
   }
 
  private:
-  double Near(const std::array<double, kActuatorCount>& q) {
-    double best = At(tau_, q);
-    for (double step = 0.01; step > 1e-13; step *= 0.5) {
-      for (bool better = true; better;) {
-        better = false;
-        for (const double tau : {tau_ - step, tau_ + step}) {
-          const double distance = At(std::clamp(tau, 0.0, plan_.duration_s), q);
-          if (distance < best) {
-            best = distance;
-            tau_ = std::clamp(tau, 0.0, plan_.duration_s);
-            better = true;
-          }
-        }
-      }
-    }
-    return std::sqrt(best);
+  static constexpr double kSurelyOn_mm = 2e-10;
+  static constexpr double kNearEnough = 0.99;  // the answer may be this much above the least
+
+  static double Reach(const Polynomial& p, double t, double half) {
+    const double fourth = 120 * p.c[5] * t + 24 * p.c[4], fifth = 120 * p.c[5];
+    return half * (std::abs(p.first(t)) +
+                   half * (std::abs(p.second(t)) / 2 +
+                           half * (std::abs(p.third(t)) / 6 +
+                                   half * (std::abs(fourth) / 24 + half * std::abs(fifth) / 120))));
   }
 
-  double At(double tau, const std::array<double, kActuatorCount>& q) {
-    while (segment_ > 0 && tau < plan_.segments[segment_].start_s) {
-      --segment_;
+  static void Bisect(const Segment& s, const std::array<double, kActuatorCount>& q, double t, double half,
+                     double& best) {
+    const double distance = std::hypot(s.q_mm[0].value(t) - q[0], s.q_mm[1].value(t) - q[1]);
+    best = std::min(best, distance);
+    const double reach = std::hypot(Reach(s.q_mm[0], t, half), Reach(s.q_mm[1], t, half));
+    if (best > kSurelyOn_mm && distance - reach < kNearEnough * best) {
+      Bisect(s, q, t - 0.5 * half, 0.5 * half, best);
+      Bisect(s, q, t + 0.5 * half, 0.5 * half, best);
     }
-    while (segment_ + 1 < plan_.segments.size() && tau >= plan_.segments[segment_ + 1].start_s) {
-      ++segment_;
-    }
-    const Segment& s = plan_.segments[segment_];
-    const double t = tau - s.start_s;
-    return std::pow(s.q_mm[0].value(t) - q[0], 2) + std::pow(s.q_mm[1].value(t) - q[1], 2);
   }
 
   const Plan& plan_;
-  std::size_t segment_ = 0;
-  double tau_ = 0.0;
+  std::size_t last_ = 0;
 };
+
+TEST(PathLaw, DistanceFromTheCurveIsSeenWhereverItIs) {
+  const Plan plan = TwoCircles(DemoMachine());
+  CurveDistance distance(plan);
+  Dice dice(7);
+  for (int k = 0; k < 400; ++k) {
+    const Segment& s =
+        plan.segments[static_cast<std::size_t>(dice.Below(static_cast<int>(plan.segments.size())))];
+    // Cubed: as often as not near a segment's end, where corners are crossed at rest.
+    const double t = s.duration_s * std::pow(dice.Between(0.0, 1.0), 3);
+    std::array<double, kActuatorCount> q{s.q_mm[0].value(t), s.q_mm[1].value(t)};
+    ASSERT_LE(distance(q), 2e-10);
+    const double vx = s.q_mm[0].first(t), vy = s.q_mm[1].first(t), v = std::hypot(vx, vy);
+    if (v > 1.0) {
+      q = {q[0] - 2e-9 * vy / v, q[1] + 2e-9 * vx / v};
+      ASSERT_NEAR(distance(q), 2e-9, 3e-10);
+    }
+  }
+}
 
 // A person's restless hand on hold, resume, override and retrace.
 void Meddle(VirtualCell& cell, Dice& dice) {
@@ -107,7 +116,7 @@ void Meddle(VirtualCell& cell, Dice& dice) {
       cell.Send(Verb::kHold, kBoth);
       break;
     case 2:
-      cell.Send(Verb::kOverride, kBoth, dice.Between(0.2, 1.2));
+      cell.Send(Verb::kOverride, kBoth, std::max(0.0, dice.Between(-0.05, 1.2)));
       break;
     case 3:
       cell.Send(Verb::kRetrace, kBoth, dice.Between(0.5, 30.0));
@@ -120,14 +129,15 @@ void Meddle(VirtualCell& cell, Dice& dice) {
 
 TEST(PathLaw, ContourKeepsItsShapeUnderHoldsOverridesAndRetraces) {
   const MachineDescription machine = DemoMachine();
-  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+  const Plan plan = TwoCircles(machine);
+  CurveDistance distance(plan);
+  double worst_of_all_mm = 0.0;
+  for (std::uint64_t seed = 1; seed <= 32; ++seed) {
     Dice dice(seed);
     CellOptions options;
     options.seed = seed;
     VirtualCell cell(machine, simulated_plant::NominalPlant(machine), options);
-    const Plan plan = TwoCircles(machine);
     cell.Begin(plan);
-    CurveDistance distance(plan);
     double worst_mm = 0.0;
     double worst_acceleration = 0.0;
     std::optional<drive::Setpoint> last, before;
@@ -177,11 +187,14 @@ TEST(PathLaw, ContourKeepsItsShapeUnderHoldsOverridesAndRetraces) {
                 ended == ModuleMode::kHeld || ended == ModuleMode::kHolding || ended == ModuleMode::kResuming)
         << Name(ended) << " " << Name(cell.drive().reason);
     EXPECT_GT(checked, 5000u);
-    // Most runs keep 1e-9 mm; with some phases of hold and retrace a set-point lies up to 0.8 um beside, not explained yet.
-    EXPECT_LE(worst_mm, 2e-3) << "seed " << seed;
+    EXPECT_LE(worst_mm, 1e-9) << "seed " << seed;
+    worst_of_all_mm = std::max(worst_of_all_mm, worst_mm);
     EXPECT_LE(worst_acceleration, machine.actuators[0].acceleration_mm_per_s2) << "seed " << seed;
     EXPECT_EQ(cell.drive_core().setpoints_late(), 0u);
   }
+  std::printf(
+      "contour under random holds, overrides and retraces, 32 seeds: at most %.1e mm beside the curve\n",
+      worst_of_all_mm);
 }
 
 TEST(JetLaw, IsNeverOnLongerThanTheDeadlineWithoutTheDrive) {
