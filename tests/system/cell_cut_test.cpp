@@ -2,6 +2,8 @@
 #include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>
 
+#include <functional>
+
 #include "foundation/contract/trouble.hpp"
 #include "lambdajet/cell/v1/cell.grpc.pb.h"
 #include "platform/rpc/channel.hpp"
@@ -120,26 +122,27 @@ class CellCut : public testing::Test {
     return Ask(&CellService::Stub::ResumeJob, request, response);
   }
 
-  // To the end; where this host itself stood still for longer than the modules' deadlines, resumes as an operator would.
-  bool Completes(const std::string& job_id) {
+  // Waits for something while the job runs. Where this host itself stood still for longer than even these tests' patient
+  // deadlines, resumes as an operator would.
+  bool Until(const std::string& job_id, const std::function<bool(const v1::Job&)>& reached) {
     return Eventually(
         [&] {
           const v1::Job job = Get(job_id);
-          if (job.state() == v1::JOB_STATE_INTERRUPTED && HostStalled(job.reason())) {
+          if (job.state() == v1::JOB_STATE_INTERRUPTED && HostStalled(job.reason()) && Resume(job_id).ok()) {
             ++host_stalls;
-            (void)Resume(job_id);
           }
-          return job.state() == v1::JOB_STATE_COMPLETED;
+          return reached(job);
         },
         kLong);
   }
+  bool Completes(const std::string& job_id) {
+    return Until(job_id, [](const v1::Job& job) { return job.state() == v1::JOB_STATE_COMPLETED; });
+  }
+  bool CutsBeyond(const std::string& job_id, double s_mm) {
+    return Until(job_id, [s_mm](const v1::Job& job) { return job.s_mm() > s_mm; });
+  }
   static bool HostStalled(const std::string& reason) {
     return reason == "OVERRUNS" || reason == "PEER_LOST" || reason == "PEER_STOPPED";
-  }
-
-  // Runs until the jet has cut that much.
-  bool CutsBeyond(const std::string& job_id, double s_mm) {
-    return Eventually([&] { return Get(job_id).s_mm() > s_mm; }, kLong);
   }
 
   test::CellProcesses processes;

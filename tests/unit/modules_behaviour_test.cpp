@@ -103,6 +103,20 @@ TEST_F(Modules, HoldAndResumePierceAgainWithAnOverlap) {
   EXPECT_EQ(cell_.switches_seen(), 4u);
 }
 
+// Between two of its states the drive stands and goes on: main motion never sees it HELD.
+TEST_F(Modules, AResumeAskedForWhileStillHoldingPiercesAgainAndGoesOn) {
+  Cut();
+  Told(Verb::kHold);
+  ASSERT_TRUE(Drive(ModuleMode::kHolding));
+  EXPECT_EQ(Told(Verb::kResume).answer, CommandAnswer::kDone);
+  ASSERT_TRUE(Drive(ModuleMode::kResuming));
+  ASSERT_TRUE(cell_.StepUntil([&] { return !cell_.main_motion().jet_on; }, 1.0))
+      << "a standing jet spoils the contour";
+  ASSERT_TRUE(Drive(ModuleMode::kRunning));
+  EXPECT_TRUE(cell_.main_motion().jet_on);
+  ASSERT_TRUE(Drive(ModuleMode::kComplete, 20.0));
+}
+
 TEST_F(Modules, OverrideChangesTheRateAndIsRefusedOutsideItsRange) {
   Cut();
   EXPECT_EQ(Told(Verb::kOverride, 0.5).answer, CommandAnswer::kDone);

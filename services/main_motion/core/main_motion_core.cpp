@@ -317,6 +317,9 @@ void MainMotionCore::FollowDrive() {
       Apply(Event::kPeerHeld, drive.reason);
       break;
     case kResuming:
+      if (mode_ == kHolding) {  // the drive stood between two of the states heard
+        Apply(Event::kPeerHeld, drive.reason);
+      }
       Apply(Event::kPeerResuming, ModuleReason::kNone);
       break;
     case kComplete:
@@ -418,6 +421,12 @@ void MainMotionCore::PassGate(const Gate& gate) {
 void MainMotionCore::RunRestore() {
   if (mode_ != kResuming || peer_lost_) {
     return;
+  }
+  if (restoring_ && pierce_ == PiercePhase::kNone) {
+    if (readings_.jet_on || readings_.abrasive_on) {
+      return;  // told to go off, and still flowing
+    }
+    BeginPierce(PierceTimeAt(track_.newest().s_mm));
   }
   if (!restoring_ || AdvancePierce()) {
     restoring_ = false;
@@ -727,9 +736,6 @@ void MainMotionCore::Act(Action action) {
       const double s_mm = track_.newest().s_mm;
       RewindEvents(s_mm);
       restoring_ = WaterWantedAt(s_mm);
-      if (restoring_) {
-        BeginPierce(PierceTimeAt(s_mm));
-      }
       break;
     }
     case Action::kFinish:
