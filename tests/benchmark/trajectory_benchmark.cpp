@@ -16,6 +16,7 @@
 #include "trajectory/core/feed/plan_program.hpp"
 #include "trajectory/core/feed/plan_samples.hpp"
 #include "trajectory/core/feed/run_profile.hpp"
+#include "trajectory/core/idle_motion/jerk_limited_move.hpp"
 #include "trajectory/core/part_program/gcode_reader.hpp"
 
 namespace lambdajet::trajectory {
@@ -89,6 +90,34 @@ void Reading() {
   std::printf(
       "read %d lines of G1: %.2f million lines/s; strtod alone %.2f (ratio %.2f)  [%zu operations, %.0f]\n",
       kLines, 1e-6 * kLines / ours, 1e-6 * kLines / baseline, baseline / ours, operations, sum);
+}
+
+// The quickest move of one actuator pair, beside the two cube roots and two square roots that a move without any case
+// distinction would cost.
+void Moves() {
+  constexpr int kMoves = 1'000'000;
+  double sum = 0.0, floor = 0.0;
+  const double pair = Seconds([&] {
+    for (int i = 1; i <= kMoves; ++i) {
+      sum += SolvePairMove({0.001 * i, 0.3}, {{{120, 1500, 40000}, {120, 1500, 40000}}}).duration_s;
+    }
+  });
+  const double general = Seconds([&] {
+    for (int i = 1; i <= kMoves; ++i) {
+      sum += SolveMove({0.001 * i, 30, -20}, {120, 1500, 40000}).duration_s;
+    }
+  });
+  const double roots = Seconds([&] {
+    for (int i = 1; i <= kMoves; ++i) {
+      floor += std::cbrt(0.001 * i) + std::cbrt(0.002 * i) + std::sqrt(0.001 * i) + std::sqrt(0.3 * i);
+    }
+  });
+  std::printf(
+      "quickest move: one actuator pair, rest to rest %.1f ns, velocity to velocity %.1f ns; four roots %.1f "
+      "ns "
+      "(ratios %.2f, %.2f)  [%.3g %.3g]\n",
+      1e9 * pair / kMoves, 1e9 * general / kMoves, 1e9 * roots / kMoves, pair / roots, general / roots, sum,
+      floor);
 }
 
 double PeakMemoryMib() {
@@ -256,6 +285,7 @@ void FeedForward() {
 
 int main(int count, char** words) {
   using namespace lambdajet::trajectory;
+  Moves();
   Reading();
   PathTiming();
   PathTimingOf<2>();

@@ -230,5 +230,99 @@ TEST(IdleLawPaper, IsBetterThanTheQuinticOnlyInANarrowWindow) {
   EXPECT_NEAR(ratio(2 / kPi), 0.8057, 5e-5);
 }
 
+// Section by section what the paper's law has at its ends and joint, and where its second zone peaks.
+TEST(IdleLawPaper, EndsJointAndPeaksOfTheZones) {
+  const double v = 12.0;
+  const IdleLaw law = MakeTwoZone({.z_n = 40, .z_k = 25, .v_n = v, .duration = kPhi2});
+  const double delta = kPhi2 - law.phi1;
+  EXPECT_NEAR(law.At(law.phi1).z, 45.3254454098, kTenDecimals);
+  EXPECT_NEAR(law.At(law.phi1).z - 25.0, v * delta * delta / (2 * kPi * law.phi1), 1e-12);
+  EXPECT_NEAR(law.At(law.phi1).first, 0.0, 1e-12);
+  EXPECT_NEAR(law.At(law.phi1).third, 0.0, 1e-9);
+  EXPECT_NEAR(law.At(law.phi1 * (1 + 1e-12)).third, 0.0, 1e-9);
+  EXPECT_NEAR(law.At(0.0).third, -kPi * kPi * v / (4 * law.phi1 * law.phi1), 1e-12);
+  EXPECT_NEAR(law.At(kPhi2).third, 0.0, 1e-9);
+  const double at_second_peak = kPhi2 - delta / kPi * std::acos(0.25);
+  EXPECT_NEAR(law.At(at_second_peak).second, -9.0 / 16.0 * law.z_a, 1e-9);
+  const double at_return_peak = kPhi2 - delta * 2.0 / 3.0;
+  EXPECT_NEAR(law.At(at_return_peak).first, -0.75 * std::sqrt(3.0) * law.amplitude / delta, 1e-9);
+  // (10) has the other root on the negative side: their product is -phi2^2/3.
+  const double p = kPhi2 + kPi * 15.0 / v;
+  EXPECT_NEAR(3 * law.phi1 * law.phi1 + 2 * p * law.phi1 - kPhi2 * kPhi2, 0.0, 1e-12);
+}
+
+TEST(IdleLawPaper, SecondDerivativesOfThePrintedNinthEquation) {
+  const IdleLaw law = MakeTwoZone({.z_n = 40, .z_k = 25, .v_n = 12, .duration = kPhi2});
+  const double delta = kPhi2 - law.phi1, w = kPi / delta, unit = 12 * delta * delta / (kPi * law.phi1);
+  const auto second = [&](double x) { return unit * w * w * (0.25 * std::cos(x) - 0.5 * std::cos(2 * x)); };
+  EXPECT_NEAR(second(kPi), -40.55998764, kLastDigit);
+  EXPECT_NEAR(second(0.0), -13.51999588, kLastDigit);
+}
+
+TEST(IdleLawPaper, RestToRestPeaksInUnitsOfTheStroke) {
+  const IdleEnds unit{.z_n = 0, .z_k = 1, .duration = 1};
+  EXPECT_NEAR(BangBangBound(unit), 4.0, kLastDigit);
+  EXPECT_NEAR(MakeSimpleHarmonic(unit).peak_acceleration, 4.93480220, kLastDigit);
+  EXPECT_NEAR(MakeQuintic(unit).peak_acceleration, 5.77350269, kLastDigit);
+  EXPECT_NEAR(MakeCycloid(unit).peak_acceleration, 6.28318531, kLastDigit);
+  // v -> 0: the two-zone law becomes a double harmonic that starts with its peak.
+  EXPECT_NEAR(MakeTwoZone({.z_n = 0, .z_k = 1, .v_n = -1e-9, .duration = 1}).peak_acceleration, 9.86960440,
+              kLastDigit);
+  const IdleEnds e4{.z_n = -20, .z_k = 20, .duration = kPhi2};
+  EXPECT_NEAR(MakeSimpleHarmonic(e4).peak_acceleration, 16.8679716785, kTenDecimals);
+  EXPECT_NEAR(MakeSimpleHarmonic(e4).acceleration_jump, 16.8679716785, kTenDecimals);
+  EXPECT_NEAR(kPi * kPi * 40 / (kPhi2 * kPhi2), 33.7359433569, kTenDecimals);
+  EXPECT_NEAR(MakeTwoZone({.z_n = -20, .z_k = 20, .v_n = -1e-10, .duration = kPhi2}).peak_acceleration,
+              33.7359433569, 1e-8);
+}
+
+TEST(IdleLawPaper, SimpleHarmonicIsTheLowestWhereJumpsAreAllowed) {
+  const IdleEnds ends{.z_n = -20, .z_k = 20, .duration = kPhi2};
+  const IdleChoice choice = ChooseIdleLaw(ends, true);
+  EXPECT_EQ(choice.law.kind, IdleKind::kSimpleHarmonic);
+  EXPECT_NEAR(choice.peak_to_bound_ratio(), 4.93480220 / 4.0, kLastDigit);
+  EXPECT_NEAR(choice.law.At(0.0).second, 16.8679716785, kTenDecimals);
+  EXPECT_NEAR(choice.law.At(kPhi2).second, -16.8679716785, kTenDecimals);
+  EXPECT_NEAR(choice.law.At(kPhi2).z, 20.0, 1e-12);
+  EXPECT_EQ(ChooseIdleLaw(ends).law.acceleration_jump, 0.0);
+}
+
+TEST(IdleLawPaper, RefusedCasesAreNamed) {
+  const IdleEnds ahead{.z_n = 10, .z_k = 60, .v_n = 8, .duration = kPhi2};
+  EXPECT_EQ(MakeTwoZone(ahead).refusal, IdleRefusal::kTargetTooFarAhead);
+  EXPECT_EQ(MakeCycloid(ahead).refusal, IdleRefusal::kVelocitiesDiffer);
+  EXPECT_EQ(MakeSimpleHarmonic(ahead).refusal, IdleRefusal::kVelocitiesDiffer);
+  EXPECT_EQ(MakeTwoZone({.z_n = 0, .z_k = 1, .duration = 1}).refusal, IdleRefusal::kNoVelocityChange);
+  EXPECT_EQ(MakeMirrored({.z_n = 0, .z_k = 1, .v_n = 1, .a_k = 1, .duration = 1}).refusal,
+            IdleRefusal::kEndAcceleration);
+  EXPECT_EQ(MakeQuintic({.z_n = 0, .z_k = 1}).refusal, IdleRefusal::kEndsNotFinite);
+  EXPECT_FALSE(ChooseIdleLaw({.z_n = 0, .z_k = 1, .duration = -1}).law.exists);
+  for (const IdleLaw& law : MakeIdleLaws(ahead)) {
+    EXPECT_EQ(law.exists, law.refusal == IdleRefusal::kNone);
+  }
+}
+
+// The ranges of the claim "minimum acceleration" as far as they are printed.
+TEST(IdleLawPaper, DistanceFromTheBoundAndTheQuinticOverTheRange) {
+  double least_to_bound = 1e9, most_near_045 = 0.0;
+  for (int i = -40000; i <= 6366; ++i) {
+    const double r = i * 1e-4;
+    const IdleEnds ends{.z_n = 0, .z_k = r, .v_n = 1, .duration = 1};
+    const IdleLaw law = MakeTwoZone(ends);
+    ASSERT_TRUE(law.exists);
+    const double to_bound = law.peak_acceleration / BangBangBound(ends);
+    least_to_bound = std::min(least_to_bound, to_bound);
+    if (r <= 0.3) {
+      EXPECT_GE(to_bound, 1.895);
+      EXPECT_LE(to_bound, 2.475);
+    }
+    if (r > 0.3) {
+      most_near_045 = std::max(most_near_045, law.peak_acceleration / MakeQuintic(ends).peak_acceleration);
+    }
+  }
+  EXPECT_NEAR(least_to_bound, 1.199, 6e-4);
+  EXPECT_NEAR(most_near_045, 1.36, 5e-3);
+}
+
 }  // namespace
 }  // namespace lambdajet::trajectory

@@ -21,11 +21,13 @@ double Joint(double z_n, double z_k, double v, double duration) {
 void SetTwoZone(IdleLaw& law, double z_n, double z_k, double v) {
   const double duration = law.ends.duration;
   if (v == 0.0) {
+    law.refusal = IdleRefusal::kNoVelocityChange;
     return;
   }
   law.phi1 = Joint(z_n, z_k, v, duration);
   law.exists = law.phi1 <= duration * (1.0 + 1e-12);
   if (!law.exists) {
+    law.refusal = IdleRefusal::kTargetTooFarAhead;
     return;
   }
   law.phi1 = std::min(law.phi1, duration);
@@ -58,38 +60,84 @@ double QuinticPeak(const IdleLaw& law);
 }  // namespace
 
 std::string_view IdleKindName(IdleKind kind) {
-  static constexpr std::array<std::string_view, 4> kNames = {"TWO_ZONE", "MIRRORED", "CYCLOID", "QUINTIC"};
+  static constexpr std::array<std::string_view, kIdleKindCount> kNames = {"TWO_ZONE", "MIRRORED", "CYCLOID",
+                                                                          "QUINTIC", "SIMPLE_HARMONIC"};
   return kNames[static_cast<std::size_t>(kind)];
 }
 
+std::string_view IdleRefusalName(IdleRefusal refusal) {
+  static constexpr std::array<std::string_view, 6> kNames = {
+      "NONE",           "TARGET_TOO_FAR_AHEAD", "NO_VELOCITY_CHANGE", "VELOCITIES_DIFFER", "END_ACCELERATION",
+      "ENDS_NOT_FINITE"};
+  return kNames[static_cast<std::size_t>(refusal)];
+}
+
+namespace {
+
+bool Sound(const IdleEnds& e) {
+  return e.duration > 0.0 && std::isfinite(e.z_n) && std::isfinite(e.z_k) && std::isfinite(e.v_n) &&
+         std::isfinite(e.v_k) && std::isfinite(e.a_n) && std::isfinite(e.a_k) && std::isfinite(e.duration);
+}
+
+// What keeps a law with accelerations of its own from these ends, apart from its velocities.
+IdleRefusal RefusalOf(const IdleEnds& e) {
+  return !Sound(e)                      ? IdleRefusal::kEndsNotFinite
+         : e.a_n != 0.0 || e.a_k != 0.0 ? IdleRefusal::kEndAcceleration
+                                        : IdleRefusal::kNone;
+}
+
+}  // namespace
+
 IdleLaw MakeTwoZone(const IdleEnds& e) {
-  IdleLaw law{.kind = IdleKind::kTwoZone, .ends = e};
-  if (e.a_n == 0.0 && e.a_k == 0.0) {
+  IdleLaw law{.kind = IdleKind::kTwoZone, .refusal = RefusalOf(e), .ends = e};
+  if (law.refusal == IdleRefusal::kNone) {
     SetTwoZone(law, e.z_n + e.v_k * e.duration, e.z_k, e.v_n - e.v_k);
   }
   return law;
 }
 
 IdleLaw MakeMirrored(const IdleEnds& e) {
-  IdleLaw law{.kind = IdleKind::kMirrored, .ends = e};
-  if (e.a_n == 0.0 && e.a_k == 0.0) {
+  IdleLaw law{.kind = IdleKind::kMirrored, .refusal = RefusalOf(e), .ends = e};
+  if (law.refusal == IdleRefusal::kNone) {
     SetTwoZone(law, e.z_k - e.v_n * e.duration, e.z_n, e.v_n - e.v_k);
   }
   return law;
 }
 
 IdleLaw MakeCycloid(const IdleEnds& e) {
-  IdleLaw law{.kind = IdleKind::kCycloid, .ends = e};
-  law.exists = e.v_n == e.v_k && e.a_n == 0.0 && e.a_k == 0.0;
+  IdleLaw law{.kind = IdleKind::kCycloid, .refusal = RefusalOf(e), .ends = e};
+  if (law.refusal == IdleRefusal::kNone && e.v_n != e.v_k) {
+    law.refusal = IdleRefusal::kVelocitiesDiffer;
+  }
+  law.exists = law.refusal == IdleRefusal::kNone;
   law.amplitude = e.z_k - e.z_n - e.v_n * e.duration;
   law.peak_acceleration = 2.0 * kPi * std::abs(law.amplitude) / (e.duration * e.duration);
   return law;
 }
 
-IdleLaw MakeQuintic(const IdleEnds& e) {
-  IdleLaw law{.kind = IdleKind::kQuintic, .exists = true, .ends = e};
-  law.peak_acceleration = QuinticPeak(law);
+IdleLaw MakeSimpleHarmonic(const IdleEnds& e) {
+  IdleLaw law{.kind = IdleKind::kSimpleHarmonic, .ends = e};
+  law.refusal = !Sound(e)        ? IdleRefusal::kEndsNotFinite
+                : e.v_n != e.v_k ? IdleRefusal::kVelocitiesDiffer
+                                 : IdleRefusal::kNone;
+  law.exists = law.refusal == IdleRefusal::kNone;
+  law.amplitude = e.z_k - e.z_n - e.v_n * e.duration;
+  const double end = kPi * kPi * law.amplitude / (2.0 * e.duration * e.duration);
+  law.peak_acceleration = std::abs(end);
+  law.acceleration_jump = std::max(std::abs(end - e.a_n), std::abs(-end - e.a_k));
   return law;
+}
+
+IdleLaw MakeQuintic(const IdleEnds& e) {
+  IdleLaw law{.kind = IdleKind::kQuintic, .exists = Sound(e), .ends = e};
+  law.refusal = law.exists ? IdleRefusal::kNone : IdleRefusal::kEndsNotFinite;
+  law.peak_acceleration = law.exists ? QuinticPeak(law) : 0.0;
+  return law;
+}
+
+std::array<IdleLaw, kIdleKindCount> MakeIdleLaws(const IdleEnds& ends) {
+  return {MakeTwoZone(ends), MakeMirrored(ends), MakeCycloid(ends), MakeQuintic(ends),
+          MakeSimpleHarmonic(ends)};
 }
 
 namespace {
@@ -152,6 +200,12 @@ IdlePoint IdleLaw::At(double t) const {
               ends.v_n + amplitude / T * (1.0 - std::cos(w * t)), amplitude / T * w * std::sin(w * t),
               amplitude / T * w * w * std::cos(w * t)};
     }
+    case IdleKind::kSimpleHarmonic: {
+      const double w = kPi / T, half = 0.5 * amplitude;
+      const double s = std::sin(w * t), c = std::cos(w * t);
+      return {ends.z_n + ends.v_n * t + half * (1.0 - c), ends.v_n + half * w * s, half * w * w * c,
+              -half * w * w * w * s};
+    }
     case IdleKind::kQuintic:
       break;
   }
@@ -165,18 +219,41 @@ double BangBangBound(const IdleEnds& e) {
   return (2.0 * std::abs(E) + std::sqrt(4.0 * E * E + dv * dv)) / (T * T);
 }
 
-IdleChoice ChooseIdleLaw(const IdleEnds& ends) {
-  IdleChoice choice{MakeQuintic(ends), BangBangBound(ends),
-                    "the quintic has the lowest peak of the laws that exist"};
-  for (const IdleLaw& law : {MakeTwoZone(ends), MakeMirrored(ends), MakeCycloid(ends)}) {
-    if (law.exists && law.peak_acceleration < choice.law.peak_acceleration) {
+namespace {
+
+std::string_view ReasonOf(IdleKind kind) {
+  switch (kind) {
+    case IdleKind::kTwoZone:
+      return "the two-zone law has the lowest peak";
+    case IdleKind::kMirrored:
+      return "the mirrored two-zone law has the lowest peak";
+    case IdleKind::kCycloid:
+      return "the cycloid has the lowest peak";
+    case IdleKind::kSimpleHarmonic:
+      return "the simple harmonic has the lowest peak, and jumps in acceleration are allowed at the ends";
+    case IdleKind::kQuintic:
+      break;
+  }
+  return "the quintic has the lowest peak of the laws that exist";
+}
+
+}  // namespace
+
+IdleChoice ChooseIdleLaw(const IdleEnds& ends, bool allow_jumps) {
+  IdleChoice choice{MakeQuintic(ends), 0.0, ReasonOf(IdleKind::kQuintic)};
+  if (!choice.law.exists) {
+    choice.reason = "no law: the ends must be finite and the zone longer than nothing";
+    return choice;
+  }
+  choice.bound = BangBangBound(ends);
+  for (const IdleLaw& law : MakeIdleLaws(ends)) {
+    const bool meets = law.exists && (allow_jumps || law.acceleration_jump == 0.0);
+    if (meets && law.peak_acceleration < choice.law.peak_acceleration) {
       choice.law = law;
-      choice.reason = law.kind == IdleKind::kTwoZone    ? "the two-zone law has the lowest peak"
-                      : law.kind == IdleKind::kMirrored ? "the mirrored two-zone law has the lowest peak"
-                                                        : "the cycloid has the lowest peak";
+      choice.reason = ReasonOf(law.kind);
     }
   }
-  if (ends.a_n != 0.0 || ends.a_k != 0.0) {
+  if ((ends.a_n != 0.0 || ends.a_k != 0.0) && choice.law.kind == IdleKind::kQuintic) {
     choice.reason = "only the quintic meets accelerations at the ends";
   }
   return choice;

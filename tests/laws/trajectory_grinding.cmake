@@ -1,0 +1,1 @@
+lambdajet_check(laws_trajectory_grinding LABELS laws SOURCES trajectory_idle_move_test.cpp DEPS trajectory_core)
