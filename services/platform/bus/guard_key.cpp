@@ -23,6 +23,10 @@ bool ParseHex(const std::string& text, std::vector<std::uint8_t>& bytes) {
   return bytes.size() >= kLeastSecretBytes;
 }
 
+constexpr char kKeyAdvice[] =
+    "; bus.key_file names a file of lines '1 <64 hex digits>' (openssl rand -hex 32), mode 0400, the same on "
+    "every host";
+
 absl::Status BadLine(const std::string& path, int line) {
   return Trouble(absl::StatusCode::kInvalidArgument, "BAD_KEY_FILE",
                  path + ":" + std::to_string(line) +
@@ -35,7 +39,8 @@ absl::Status BadLine(const std::string& path, int line) {
 absl::StatusOr<std::vector<GuardKey>> ReadGuardKeys(const std::string& path) {
   const auto content = ReadWholeFile(path, 64 * 1024);
   if (!content.ok()) {
-    return content.status();
+    return Trouble(content.status().code(), TroubleReason(content.status()),
+                   "key file: " + std::string(content.status().message()) + kKeyAdvice, {{"path", path}});
   }
   struct stat about {};
   if (stat(path.c_str(), &about) != 0 || (about.st_mode & (S_IROTH | S_IWOTH | S_IWGRP)) != 0) {
@@ -66,7 +71,8 @@ absl::StatusOr<std::vector<GuardKey>> ReadGuardKeys(const std::string& path) {
     keys.push_back(std::move(key));
   }
   if (keys.empty()) {
-    return Trouble(absl::StatusCode::kInvalidArgument, "BAD_KEY_FILE", "key file " + path + " holds no key");
+    return Trouble(absl::StatusCode::kInvalidArgument, "BAD_KEY_FILE",
+                   "key file " + path + " holds no key" + kKeyAdvice);
   }
   return keys;
 }

@@ -166,7 +166,8 @@ class Loader {
     file_ = file;
     const auto content = ReadWholeFile(file, kMostFileBytes);
     if (!content.ok()) {
-      Fault("config file: " + std::string(content.status().message()));
+      Fault("config file: " + std::string(content.status().message()) +
+            "; --config names it, deploy/config holds one for every house");
       return;
     }
     try {

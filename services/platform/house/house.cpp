@@ -28,6 +28,9 @@ namespace {
 #error "LAMBDAJET_VERSION comes from CMake"
 #endif
 
+constexpr char kAnnounceAdvice[] =
+    "; name a file in a folder that exists and that this user may write, or leave announce_file empty";
+
 LogLevel LevelOf(const std::string& word) {
   return word == "debug"     ? LogLevel::kDebug
          : word == "warning" ? LogLevel::kWarning
@@ -77,6 +80,7 @@ class House::Inside {
   Counter clock_steps;
 
   absl::Status Start();
+  absl::Status CheckAnnounceFile() const;
   void UpdateReadiness();
   void Announce();
   void Second();
@@ -84,11 +88,26 @@ class House::Inside {
   void Stop();
 };
 
+// Whoever waits for the announce file would wait for ever if it could not be written when the time comes.
+absl::Status House::Inside::CheckAnnounceFile() const {
+  if (config.announce_file.empty()) {
+    return absl::OkStatus();
+  }
+  const absl::Status status = CheckFileCanBeWritten(config.announce_file);
+  return status.ok() ? status
+                     : Trouble(status.code(), TroubleReason(status),
+                               "announce_file: " + std::string(status.message()) + kAnnounceAdvice,
+                               {{"path", config.announce_file}});
+}
+
 absl::Status House::Inside::Start() {
   if (!IsId(config.machine_id)) {
     return Trouble(
         absl::StatusCode::kInvalidArgument, "BAD_ID",
         "machine_id is '" + config.machine_id.substr(0, 64) + "'; right is 1 to 63 of a-z, 0-9 and '-'");
+  }
+  if (absl::Status status = CheckAnnounceFile(); !status.ok()) {
+    return status;
   }
   metrics->AddBuildInfo(name, LAMBDAJET_VERSION);
   ready_gauge = metrics->AddGauge("lambdajet_ready", "1 when this house is ready.");
@@ -124,7 +143,10 @@ void House::Inside::Announce() {
                                {"metrics_port", exporter->port()}};
   if (const absl::Status status = WriteFileAtomically(config.announce_file, json.dump() + "\n");
       !status.ok()) {
-    log->Error("announce_failed", std::string(status.message()));
+    log->Error("announce_failed", "announce_file: " + std::string(status.message()) + kAnnounceAdvice,
+               {{"reason", TroubleReason(status)}});
+    exit_code.store(kExitUnavailable);
+    StopSignal::Request();
   }
 }
 

@@ -92,6 +92,20 @@ absl::Status WriteFileAtomically(const std::string& path, std::string_view conte
   return SyncFolderOf(path);
 }
 
+absl::Status CheckFileCanBeWritten(const std::string& path) {
+  struct stat about {};
+  if (stat(path.c_str(), &about) == 0 && S_ISDIR(about.st_mode)) {
+    return FileTrouble("cannot write", path, EISDIR);
+  }
+  std::string temporary = path + ".XXXXXX";
+  const Descriptor file(mkostemp(temporary.data(), O_CLOEXEC));
+  if (!file.open()) {
+    return FileTrouble("cannot create a file beside", path, errno);
+  }
+  unlink(temporary.c_str());
+  return absl::OkStatus();
+}
+
 absl::StatusOr<std::string> ReadWholeFile(const std::string& path, std::size_t most_bytes) {
   // Non-blocking, so that a FIFO in the place of a file is refused and not waited for.
   const Descriptor file(open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));

@@ -16,6 +16,10 @@ namespace lambdajet {
 
 absl::Status WriteFileAtomically(const std::string& path, std::string_view content);
 
+// Whether WriteFileAtomically could write there now, tried with an empty file that does not stay: for a start that shall
+// fail early rather than late.
+absl::Status CheckFileCanBeWritten(const std::string& path);
+
 // The whole file; refuses one larger than `most_bytes` (OUT_OF_RANGE FILE_TOO_LARGE) and anything but a
 // regular file.
 absl::StatusOr<std::string> ReadWholeFile(const std::string& path, std::size_t most_bytes);

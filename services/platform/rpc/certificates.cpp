@@ -23,11 +23,23 @@ absl::Status Bad(const char* reason, const std::string& file, const std::string&
   return Trouble(absl::StatusCode::kInvalidArgument, reason, file + " " + what, {{"path", file}});
 }
 
+absl::StatusOr<std::string> ReadPem(const std::string& file) {
+  auto pem = ReadWholeFile(file, kMostPemBytes);
+  if (pem.ok()) {
+    return pem;
+  }
+  return Trouble(pem.status().code(), TroubleReason(pem.status()),
+                 std::string(pem.status().message()) +
+                     "; rpc.certificate_file, rpc.key_file and rpc.client_ca_file name PEM files that this "
+                     "user may read",
+                 {{"path", file}});
+}
+
 // Refuses instead of asking on the terminal.
 int NoPassword(char*, int, int, void*) { return 0; }
 
 absl::Status ReadCertificate(const std::string& file, Certificate& certificate) {
-  const auto pem = ReadWholeFile(file, kMostPemBytes);
+  const auto pem = ReadPem(file);
   if (!pem.ok()) {
     return pem.status();
   }
@@ -48,7 +60,7 @@ absl::Status CheckKeyPair(const std::string& certificate_file, const std::string
   if (absl::Status status = ReadCertificate(certificate_file, certificate); !status.ok()) {
     return status;
   }
-  const auto pem = ReadWholeFile(key_file, kMostPemBytes);
+  const auto pem = ReadPem(key_file);
   if (!pem.ok()) {
     return pem.status();
   }

@@ -21,20 +21,23 @@ absl::Status SqlTrouble(sqlite3* connection, int code, const std::string& path, 
   const TroubleDetails details{{"path", path}};
   switch (code & 0xff) {
     case SQLITE_FULL:
-      return Trouble(absl::StatusCode::kResourceExhausted, "DISK_FULL", message, details);
+      return Trouble(absl::StatusCode::kResourceExhausted, "DISK_FULL", message + "; make room on its disk",
+                     details);
     case SQLITE_BUSY:
     case SQLITE_LOCKED:
       return Trouble(absl::StatusCode::kUnavailable, "DATABASE_BUSY", message, details);
     case SQLITE_CORRUPT:
     case SQLITE_NOTADB:
-      return Trouble(absl::StatusCode::kDataLoss, "DATABASE_DAMAGED", message, details);
+      return Trouble(absl::StatusCode::kDataLoss, "DATABASE_DAMAGED",
+                     message + "; restore it from a copy, or name another", details);
     case SQLITE_CONSTRAINT:
       return Trouble(absl::StatusCode::kAlreadyExists, "CONSTRAINT", message, details);
     case SQLITE_READONLY:
     case SQLITE_PERM:
     case SQLITE_AUTH:
     case SQLITE_CANTOPEN:
-      return Trouble(absl::StatusCode::kPermissionDenied, "NOT_PERMITTED", message, details);
+      return Trouble(absl::StatusCode::kPermissionDenied, "NOT_PERMITTED",
+                     message + "; name a file in a folder that exists and that this user may write", details);
     default:
       return Trouble(absl::StatusCode::kInternal, "DATABASE_TROUBLE", message, details);
   }
