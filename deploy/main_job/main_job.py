@@ -35,6 +35,8 @@ def parse():
     parser.add_argument("--output", type=pathlib.Path, default=SOURCE / "build" / "demo", help="folder of the report (default: build/demo)")
     parser.add_argument("--build-folder", type=pathlib.Path, default=SOURCE / "build" / "release", help=argparse.SUPPRESS)
     parser.add_argument("--domain", type=int, help=argparse.SUPPRESS)  # tests: a DDS domain of their own
+    # tests: "host" takes the programs of the build folder into the image instead of compiling them in it
+    parser.add_argument("--container-programs", choices=("build", "host"), default="build", help=argparse.SUPPRESS)
     parser.add_argument("--free-ports", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
     for name in ("plant", "part", "machine", "output", "build_folder"):
@@ -188,7 +190,7 @@ def verify_stage(run, cell, console, wish):
     import stages
 
     console.say("\nVerifying the base: the camera looks at a few marks on the sheet.")
-    found = stages.verify(cell, f"{wish}-verify", job_words(console))
+    found = stages.verify(cell, f"{wish}-verify", job_words(console), console.say)
     run.verification = {
         "verdict": found.verdict, "chi_square": found.chi_square, "degrees_of_freedom": found.degrees_of_freedom,
         "shift_x_mm": found.shift_x_mm, "shift_y_mm": found.shift_y_mm, "turn_rad": found.turn_rad, "rms_mm": found.rms_mm,
@@ -202,7 +204,7 @@ def identify_stage(run, cell, console, wish):
 
     console.say("\nIdentifying the electronic base, the jet offset and the elasticity: marks, trial pierces, a shaken sheet.")
     tell = job_words(console)
-    job, result, active = stages.identify(cell, f"{wish}-identify", tell, lambda op: console.bar(op.progress, op.phase))
+    job, result, active = stages.identify(cell, f"{wish}-identify", tell, console.say, lambda op: console.bar(op.progress, op.phase))
     parameters = [{"name": p.name, "unit": p.unit, "before": p.before, "before_sigma": p.before_sigma, "after": p.after,
                    "after_sigma": p.after_sigma} for p in result.parameters]
     words = (f"{job.length_mm:.0f} mm of measuring; residuals {result.rms_before_mm:.3f} mm before, {result.rms_after_mm:.4f} mm after, "
@@ -289,6 +291,7 @@ def main():
     console = Console()
     run = Run(options)
     processes = make_processes(options)
+    cell = None
     try:
         cell = start(run, processes, console)
         main_job(run, processes, cell, console)
@@ -304,6 +307,8 @@ def main():
         console.say(f"\nthe main job ended: {stages.explain(error)}\nlogs: {options.output / 'run'}")
         return 1
     finally:
+        if cell is not None:
+            cell.close()  # so that no process has to wait for its client
         processes.stop()
 
 

@@ -8,6 +8,7 @@ from lambdajet.type.v1 import operation_pb2
 
 RPC_TIMEOUT_S = 20.0
 RESUMES_ALLOWED = 3
+RUNS_ALLOWED = 3
 ENDED = (cell_pb2.JOB_STATE_COMPLETED, cell_pb2.JOB_STATE_FAILED, cell_pb2.JOB_STATE_CANCELLED, cell_pb2.JOB_STATE_REFUSED)
 
 
@@ -116,17 +117,27 @@ def cut(cell, name, program, drawing, compensate, request_id, seed, tell):
     return job, prediction, found, report
 
 
-def verify(cell, request_id, tell):
+def run_in_one_piece(cell, name, program, request_id, tell, say):
+    """Calibration judges the looks of one plan. A run that was interrupted and resumed left its looks in two, so it is driven again."""
+    for attempt in range(RUNS_ALLOWED):
+        job = run(cell, submit(cell, name, program, False, f"{request_id}-{attempt}"), tell)
+        if len(job.plan_ids) <= 1:
+            return job
+        say("  it was interrupted on the way and resumed; the looks of one uninterrupted run are needed, so once more")
+    raise StageFailed(f"'{name}' was interrupted in each of {RUNS_ALLOWED} runs; the machine's own words are in the modules' logs")
+
+
+def verify(cell, request_id, tell, say):
     """Looks at a few marks and compares them with the active version."""
     plan = cell.calibration.PlanVerification(calibration_pb2.PlanVerificationRequest(), timeout=RPC_TIMEOUT_S)
-    job = run(cell, submit(cell, "verify the base", plan.program, False, request_id), tell)
+    job = run_in_one_piece(cell, "verify the base", plan.program, request_id, tell, say)
     return cell.calibration.VerifyBase(calibration_pb2.VerifyBaseRequest(plan_id=job.plan_id), timeout=RPC_TIMEOUT_S)
 
 
-def identify(cell, request_id, tell, tell_operation):
+def identify(cell, request_id, tell, say, tell_operation):
     """Measures, identifies and activates; returns (plan of the run, result, active version)."""
     plan = cell.calibration.PlanMeasuringRun(calibration_pb2.PlanMeasuringRunRequest(), timeout=RPC_TIMEOUT_S)
-    job = run(cell, submit(cell, "measuring run", plan.program, False, request_id), tell)
+    job = run_in_one_piece(cell, "measuring run", plan.program, request_id, tell, say)
     operation = cell.calibration.StartIdentification(
         calibration_pb2.StartIdentificationRequest(plan_id=job.plan_id, author="main-job"), timeout=RPC_TIMEOUT_S
     ).operation
