@@ -23,6 +23,12 @@ if(CCACHE)
   set(CMAKE_CXX_COMPILER_LAUNCHER ${CCACHE})
 endif()
 
+# A third of all building was linking; mold does it in a tenth of the time.
+find_program(MOLD mold)
+if(MOLD)
+  add_link_options(-fuse-ld=mold)
+endif()
+
 set(LAMBDAJET_SANITIZE "" CACHE STRING "Sanitizers to build everything with, as in -fsanitize=…")
 if(LAMBDAJET_SANITIZE)
   add_compile_options(-fsanitize=${LAMBDAJET_SANITIZE} -fno-omit-frame-pointer)

@@ -203,48 +203,5 @@ TEST_F(CellCut, AStoppedJobIsResumedFromWhatWasCut) {
   EXPECT_NEAR(Get(job_id).s_mm(), Get(job_id).length_mm(), 1e-6);
 }
 
-TEST_F(CellCut, AKilledCellFindsItsJobAgain) {
-  const std::string job_id = MustStart(LongPart());
-  ASSERT_TRUE(CutsBeyond(job_id, 30.0)) << Get(job_id).DebugString();
-  processes.Kill("cell");
-  ASSERT_TRUE(processes.Start("cell").WaitUntilReady());
-  ASSERT_TRUE(Completes(job_id)) << Get(job_id).DebugString();
-  EXPECT_EQ(Get(job_id).plan_ids_size(), 1 + host_stalls);
-}
-
-TEST_F(CellCut, AKilledTrajectoryStarvesTheDriveUntilItIsBack) {
-  const std::string job_id = MustStart(LongPart());
-  ASSERT_TRUE(CutsBeyond(job_id, 30.0)) << Get(job_id).DebugString();
-  processes.Kill("trajectory");
-  ASSERT_TRUE(Reaches(job_id, v1::JOB_STATE_HELD)) << Get(job_id).DebugString();
-  EXPECT_EQ(Get(job_id).reason(), "STARVED");
-  ASSERT_TRUE(processes.Start("trajectory").WaitUntilReady());
-  ASSERT_TRUE(Completes(job_id)) << Get(job_id).DebugString();
-  EXPECT_EQ(Get(job_id).plan_ids_size(), 1 + host_stalls);
-}
-
-class CellLosesModule : public CellCut, public testing::WithParamInterface<const char*> {};
-
-TEST_P(CellLosesModule, AndResumesWhenItIsBack) {
-  const std::string job_id = MustStart(LongPart());
-  ASSERT_TRUE(CutsBeyond(job_id, 40.0)) << Get(job_id).DebugString();
-  processes.Kill(GetParam());
-  ASSERT_TRUE(Reaches(job_id, v1::JOB_STATE_INTERRUPTED)) << Get(job_id).DebugString();
-  EXPECT_FALSE(Get(job_id).reason().empty());
-  ASSERT_TRUE(processes.Start(GetParam()).WaitUntilReady());
-  absl::Status status;
-  EXPECT_TRUE(Eventually(
-      [&] {  // the cell has to hear the module again first
-        status = Resume(job_id);
-        return status.ok() || TroubleReason(status) == "WRONG_JOB_STATE";
-      },
-      kLong))
-      << status;
-  ASSERT_TRUE(Completes(job_id)) << Get(job_id).DebugString();
-  EXPECT_GE(Get(job_id).plan_ids_size(), 2);
-}
-
-INSTANTIATE_TEST_SUITE_P(Modules, CellLosesModule, testing::Values("drive", "main_motion"));
-
 }  // namespace
 }  // namespace lambdajet
