@@ -1,4 +1,4 @@
 add_executable(twenty_plants twenty_plants/twenty_plants.cpp)
 lambdajet_own_code(twenty_plants)
 target_include_directories(twenty_plants PRIVATE ${CMAKE_SOURCE_DIR})
-target_link_libraries(twenty_plants PRIVATE cut_trial platform_machine_file platform_process inspection_drawing_file)
+target_link_libraries(twenty_plants PRIVATE cut_trial platform_machine_file)

@@ -8,6 +8,8 @@
 #include "accuracy/core/prediction.hpp"
 #include "calibration/core/identification.hpp"
 #include "calibration/core/measuring_plan.hpp"
+#include "inspection/drawing_file/drawing_file.hpp"
+#include "platform/process/atomic_file.hpp"
 #include "simulated_plant/core/nominal_plant.hpp"
 #include "tests/support/virtual_cell.hpp"
 #include "trajectory/core/feed/plan_program.hpp"
@@ -162,10 +164,9 @@ std::string WhyNotComplete(const CellRun& run) {
 
 class Trial {
  public:
-  Trial(const MachineDescription& as_designed, const TrialPart& part, std::uint64_t seed)
-      : part_(part),
-        machine_(as_designed),
-        cell_(as_designed, simulated_plant::RandomPlant(as_designed, seed), OptionsOf(seed)) {
+  Trial(const MachineDescription& as_designed, const simulated_plant::PlantTruth& truth,
+        const TrialPart& part, std::uint64_t seed)
+      : part_(part), machine_(as_designed), cell_(as_designed, truth, OptionsOf(seed)) {
     trial_.seed = seed;
   }
 
@@ -269,8 +270,27 @@ TrialPart PlateWithHoles(double kerf_width_mm, double feed_mm_per_s) {
   return part;
 }
 
+absl::StatusOr<TrialPart> ReadTrialPart(const std::string& stem) {
+  constexpr std::size_t kMostBytes = 4u << 20;
+  const auto program = ReadWholeFile(stem + ".ngc", kMostBytes);
+  const auto yaml = ReadWholeFile(stem + ".drawing.yaml", kMostBytes);
+  if (!program.ok() || !yaml.ok()) {
+    return program.ok() ? yaml.status() : program.status();
+  }
+  const auto drawing = inspection::ReadDrawing(*yaml);
+  if (!drawing.ok()) {
+    return drawing.status();
+  }
+  return TrialPart{*program, *drawing};
+}
+
+PlantTrial RunTrial(const MachineDescription& as_designed, const simulated_plant::PlantTruth& truth,
+                    const TrialPart& part, std::uint64_t seed) {
+  return Trial(as_designed, truth, part, seed).Run();
+}
+
 PlantTrial RunTrial(const MachineDescription& as_designed, const TrialPart& part, std::uint64_t seed) {
-  return Trial(as_designed, part, seed).Run();
+  return RunTrial(as_designed, simulated_plant::RandomPlant(as_designed, seed), part, seed);
 }
 
 }  // namespace lambdajet::tests

@@ -11,8 +11,10 @@
 #include <cstdint>
 #include <string>
 
+#include "absl/status/statusor.h"
 #include "foundation/machine/machine_description.hpp"
 #include "inspection/core/comparison.hpp"
+#include "simulated_plant/core/plant_truth.hpp"
 
 namespace lambdajet::tests {
 
@@ -20,6 +22,9 @@ struct TrialPart {
   std::string program;
   inspection::Drawing drawing;
 };
+
+// A shipped part: STEM.ngc and STEM.drawing.yaml.
+absl::StatusOr<TrialPart> ReadTrialPart(const std::string& stem);
 
 // A plate of 300 x 200 mm with two sharp and two rounded corners and three holes.
 TrialPart PlateWithHoles(double kerf_width_mm, double feed_mm_per_s);
@@ -57,6 +62,10 @@ struct PlantTrial {
   const CutResult& cut(TrialStage stage) const { return cuts[static_cast<std::size_t>(stage)]; }
 };
 
+// On this machine; `seed` is that of its noise.
+PlantTrial RunTrial(const MachineDescription& as_designed, const simulated_plant::PlantTruth& truth,
+                    const TrialPart& part, std::uint64_t seed);
+// On one drawn at random.
 PlantTrial RunTrial(const MachineDescription& as_designed, const TrialPart& part, std::uint64_t seed);
 
 }  // namespace lambdajet::tests

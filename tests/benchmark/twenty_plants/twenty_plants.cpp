@@ -9,9 +9,7 @@
 #include <cstdlib>
 #include <vector>
 
-#include "inspection/drawing_file/drawing_file.hpp"
 #include "platform/machine_file/machine_file.hpp"
-#include "platform/process/atomic_file.hpp"
 #include "tests/support/cut_trial.hpp"
 
 namespace lambdajet::tests {
@@ -62,20 +60,6 @@ void PrintSummary(const std::vector<PlantTrial>& trials) {
   }
 }
 
-absl::StatusOr<TrialPart> ReadPart(const std::string& stem) {
-  constexpr std::size_t kMostBytes = 4u << 20;
-  const auto program = ReadWholeFile(stem + ".ngc", kMostBytes);
-  const auto yaml = ReadWholeFile(stem + ".drawing.yaml", kMostBytes);
-  if (!program.ok() || !yaml.ok()) {
-    return program.ok() ? yaml.status() : program.status();
-  }
-  const auto drawing = inspection::ReadDrawing(*yaml);
-  if (!drawing.ok()) {
-    return drawing.status();
-  }
-  return TrialPart{*program, *drawing};
-}
-
 int Run(int argc, char** argv) {
   const char* source = std::getenv("LAMBDAJET_SOURCE_DIR");
   const std::string file =
@@ -90,7 +74,7 @@ int Run(int argc, char** argv) {
   const std::string stem = argc > 4 ? argv[4] : std::string(source ? source : ".") + "/deploy/parts/bracket";
   const auto chosen = stem == "plate"
                           ? PlateWithHoles(machine->process.kerf_width_mm, machine->path.feed_mm_per_s)
-                          : ReadPart(stem);
+                          : ReadTrialPart(stem);
   if (!chosen.ok()) {
     std::fprintf(stderr, "%s\n", chosen.status().ToString().c_str());
     return 1;
