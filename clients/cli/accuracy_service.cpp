@@ -22,6 +22,10 @@ struct PredictOptions {
 };
 
 void PrintPrediction(const v1::PredictContourResponse& prediction, Output& output) {
+  if (prediction.reason() != "PREDICTED") {
+    output.Text("no bound: " + prediction.reason(), Tone::kWarning);
+    return;
+  }
   output.Text(
       fmt::format("the contour's 95th percentile stays below {:.4f} mm with 95 % probability (linear {:.4f}, "
                   "expected {:.4f} mm), machine version {}",
@@ -84,7 +88,10 @@ absl::Status Map(std::optional<std::uint32_t> columns, std::optional<std::uint32
   v1::ErrorMapResponse response;
   const absl::Status status =
       connections.Ask<AccuracyService>("accuracy", &AccuracyService::Stub::ErrorMap, request, response);
-  if (!status.ok() || output.json()) {
+  if (!status.ok()) {
+    return status;
+  }
+  if (output.json()) {
     PrintJson(response, output);
     return status;
   }

@@ -34,17 +34,22 @@ void PrintChanges(const google::protobuf::RepeatedPtrField<v1::ParameterChange>&
   output.Table(table);
 }
 
+// With --json the answer holds the program, so that it is written to a file only.
+absl::Status WriteProgram(const std::string& out, const std::string& program, const Output& output) {
+  return output.json() && out == "-" ? absl::OkStatus() : WriteTextFile(out, program);
+}
+
 absl::Status PlanRun(const v1::PlanMeasuringRunRequest& request, const std::string& out,
                      const Connections& connections, Output& output) {
   v1::PlanMeasuringRunResponse response;
   absl::Status status = connections.Ask<CalibrationService>(
       kService, &CalibrationService::Stub::PlanMeasuringRun, request, response);
-  if (!status.ok() || output.json()) {
-    PrintJson(response, output);
+  if (!status.ok()) {
     return status;
   }
+  PrintJson(response, output);
   output.Message(response.expectation());
-  return WriteTextFile(out, response.program());
+  return WriteProgram(out, response.program(), output);
 }
 
 absl::Status Verify(std::uint64_t plan_id, const std::string& program, std::optional<std::uint32_t> looks,
@@ -57,7 +62,11 @@ absl::Status Verify(std::uint64_t plan_id, const std::string& program, std::opti
     v1::PlanVerificationResponse response;
     const absl::Status status = connections.Ask<CalibrationService>(
         kService, &CalibrationService::Stub::PlanVerification, request, response);
-    return status.ok() ? WriteTextFile(program, response.program()) : status;
+    if (!status.ok()) {
+      return status;
+    }
+    PrintJson(response, output);
+    return WriteProgram(program, response.program(), output);
   }
   v1::VerifyBaseRequest request;
   request.set_plan_id(plan_id);
@@ -87,7 +96,10 @@ absl::Status Runs(std::uint64_t plan_id, const Connections& connections, Output&
     v1::GetRunResponse response;
     const absl::Status status =
         connections.Ask<CalibrationService>(kService, &CalibrationService::Stub::GetRun, request, response);
-    if (!status.ok() || output.json()) {
+    if (!status.ok()) {
+      return status;
+    }
+    if (output.json()) {
       PrintJson(response, output);
       return status;
     }
@@ -109,15 +121,16 @@ absl::Status Runs(std::uint64_t plan_id, const Connections& connections, Output&
   v1::ListRunsResponse response;
   const absl::Status status =
       connections.Ask<CalibrationService>(kService, &CalibrationService::Stub::ListRuns, request, response);
+  if (!status.ok()) {
+    return status;
+  }
   PrintJson(response, output);
   TextTable table{{"plan", "looks", "unseen"}, {}};
   for (const v1::Run& run : response.runs()) {
     table.rows.push_back(
         {std::to_string(run.plan_id()), std::to_string(run.looks()), std::to_string(run.unseen())});
   }
-  if (status.ok()) {
-    output.Table(table);
-  }
+  output.Table(table);
   return status;
 }
 

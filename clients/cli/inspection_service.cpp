@@ -46,7 +46,10 @@ absl::Status Compare(std::uint64_t plan_id, const std::string& drawing, const st
     }
     status = WriteCsv(out, table);
   }
-  if (!status.ok() || output.json()) {
+  if (!status.ok()) {
+    return status;
+  }
+  if (output.json()) {
     PrintJson(response, output);
     return status;
   }
@@ -65,7 +68,8 @@ absl::Status Compare(std::uint64_t plan_id, const std::string& drawing, const st
   return status;
 }
 
-absl::Status Path(std::uint64_t plan_id, const std::string& out, const Connections& connections) {
+absl::Status Path(std::uint64_t plan_id, const std::string& out, const Connections& connections,
+                  Output& output) {
   const auto channel = connections.Open(kService);
   if (!channel.ok()) {
     return channel.status();
@@ -78,12 +82,13 @@ absl::Status Path(std::uint64_t plan_id, const std::string& out, const Connectio
   const auto stream = stub.StreamCutPath(&context, request);
   CsvTable table({"time_s", "x_W_mm", "y_W_mm", "jet_on"});
   for (v1::CutPathBatch batch; stream->Read(&batch);) {
+    PrintJson(batch, output);
     for (int i = 0; i + 4 <= batch.values_size(); i += 4) {
       table.AddRow(std::vector<double>(batch.values().begin() + i, batch.values().begin() + i + 4));
     }
   }
   const absl::Status status = connections.Named(kService, FromWire(stream->Finish()));
-  return status.ok() ? WriteCsv(out, table) : status;
+  return status.ok() && !(output.json() && out == "-") ? WriteCsv(out, table) : status;
 }
 
 }  // namespace
@@ -99,8 +104,13 @@ void AddInspectionServiceVerbs(CLI::App& noun, Output& output, const Connections
     request.set_plan_id(*begun);
     request.mutable_further_plan_ids()->Add(further->begin(), further->end());
     v1::BeginRecordingResponse response;
-    output.Finish(connections.Ask<InspectionService>(kService, &InspectionService::Stub::BeginRecording,
-                                                     request, response));
+    const absl::Status status = connections.Ask<InspectionService>(
+        kService, &InspectionService::Stub::BeginRecording, request, response);
+    if (status.ok()) {
+      PrintJson(response, output);
+      output.Text(fmt::format("the truth of plan {} is kept from now on", *begun));
+    }
+    output.Finish(status);
   });
 
   auto ended = std::make_shared<std::uint64_t>(0);
@@ -136,7 +146,7 @@ void AddInspectionServiceVerbs(CLI::App& noun, Output& output, const Connections
   CLI::App* path = AddServiceVerb(noun, "path", "the recorded path of the cut front on the sheet as CSV");
   path->add_option("PLAN", *pathed, "the plan's id")->required();
   path->add_option("--out", *out, "CSV; - is standard output");
-  path->callback([=, &output, &connections] { output.Finish(Path(*pathed, *out, connections)); });
+  path->callback([=, &output, &connections] { output.Finish(Path(*pathed, *out, connections, output)); });
 }
 
 }  // namespace lambdajet::cli

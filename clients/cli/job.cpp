@@ -67,10 +67,12 @@ void PrintJob(const v1::Job& job, Output& output) {
   }
   output.Text(fmt::format("  name {}  request {}  machine {} version {}", job.name(), job.request_id(),
                           job.model_version().machine_id(), job.model_version().version()));
-  output.Text(
-      fmt::format("  {:.1f} of {:.1f} mm ({:.0f} %), expected {:.1f} s, predicted 95 % bound {:.3f} mm{}",
-                  job.s_mm(), job.length_mm(), job.progress() * 100, job.expected_duration_s(),
-                  job.predicted_95_mm(), job.compensated() ? ", compensated" : ""));
+  const std::string bound = job.predicted_95_mm() > 0.0
+                                ? fmt::format(", predicted 95 % bound {:.3f} mm", job.predicted_95_mm())
+                                : "";
+  output.Text(fmt::format("  {:.1f} of {:.1f} mm ({:.0f} %), expected {:.1f} s{}{}", job.s_mm(),
+                          job.length_mm(), job.progress() * 100, job.expected_duration_s(), bound,
+                          job.compensated() ? ", compensated" : ""));
   output.Text(fmt::format("  plan {}  submitted {}  started {}  ended {}", job.plan_id(), job.submitted(),
                           job.started(), job.ended()));
 }
@@ -307,7 +309,10 @@ absl::Status Report(const std::string& job_id, const std::string& trace, const s
     status = WriteCsv(events,
                       Strided({"s_wanted_mm", "s_rate_mm_per_s", "deviation_mm"}, report.event_deviations()));
   }
-  if (!status.ok() || output.json()) {
+  if (!status.ok()) {
+    return status;
+  }
+  if (output.json()) {
     PrintJson(report, output);
     return status;
   }
@@ -416,6 +421,9 @@ void AddResumeStopOverride(CLI::App& noun, Output& output, const Connections& co
         connections.Ask<CellService>("cell", &CellService::Stub::StopJob, request, response);
     if (status.ok() && response.has_job()) {
       PrintJob(response.job(), output);
+    } else if (status.ok()) {
+      PrintJson(response, output);
+      output.Text("stopped; no job was running; reset the machine before the next start");
     }
     output.Finish(status);
   });

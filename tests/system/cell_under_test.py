@@ -45,12 +45,12 @@ def cell_under_test(build, plant=SOURCE / "deploy" / "plants" / "shipped.yaml", 
             flags=[f"--bus.domain={domain}", "--metrics.address=127.0.0.1:0", *flags],
             ports=cell_processes.free_ports(),
         )
-        try:
+        with contextlib.ExitStack() as at_the_end:
+            at_the_end.callback(processes.stop)
             processes.start()
             cell = wait_serving(processes, HOUSES)
+            at_the_end.callback(cell.close)  # first: a server waits some seconds for clients that are still connected
             yield processes, cell
-        finally:
-            processes.stop()
 
 
 def wait_serving(processes, names, deadline_s=30):

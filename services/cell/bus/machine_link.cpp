@@ -209,7 +209,8 @@ class MachineLink::Inside {
       desk_.HearModel({machine_id_, sample.version(), std::string(sample.hash().c_str())});
     }
     if (number % kCyclesBetweenServiceLooks == 0) {
-      const bool alive = model_->alive() > 0;
+      // Descriptions are told once and have no liveliness of their own: whoever is gone is no longer matched.
+      const bool alive = model_->matched() > 0;
       desk_.HearService("calibration", alive, alive ? "" : "NOT_REACHED");
     }
     const JobDesk::Outgoing outgoing = desk_.Cycle();

@@ -1,0 +1,182 @@
+"""Every verb of `lambdajet` that asks a service, against a live cell, in people's words and with --json: the exit code, one JSON
+value (or one a line) on standard output, nothing there when the verb fails. One short run over two marks is really driven."""
+
+import json
+import pathlib
+import subprocess
+import sys
+import unittest
+
+import cell_under_test as under_test
+
+BUILD = pathlib.Path(sys.argv.pop(1))
+DRAWING = under_test.SOURCE / "deploy" / "parts" / "bracket.drawing.yaml"
+DONE, REFUSED, UNREACHABLE, WRONG_STATE = 0, 4, 3, 6
+
+
+class Lambdajet:
+    def __init__(self, test, announce_folder):
+        self.test = test
+        self.flags = ["--announce-dir", str(announce_folder)]
+
+    def run(self, *words, code=DONE):
+        """Standard output; fails the test unless the exit code is one of those expected."""
+        done = subprocess.run([str(BUILD / "bin" / "lambdajet"), *self.flags, *map(str, words)], stdin=subprocess.DEVNULL,
+                              stdout=subprocess.PIPE, stderr=subprocess.PIPE, timeout=60, check=False)
+        said, trouble = done.stdout.decode(), done.stderr.decode()
+        expected = code if isinstance(code, tuple) else (code,)
+        self.test.assertIn(done.returncode, expected, f"{words}: {said}{trouble}")
+        if done.returncode in (REFUSED, UNREACHABLE):
+            self.test.assertEqual(said, "", f"{words} failed and still answered")
+            self.test.assertNotEqual(trouble, "", f"{words} failed in silence")
+        return said if done.returncode not in (REFUSED, UNREACHABLE) else trouble
+
+    def ask(self, *words, code=DONE):
+        """What the verb says with --json, after it has said the same in words: (words, value)."""
+        people = self.run(*words, code=code)
+        self.test.assertNotEqual(people.strip(), "", f"{words} has nothing to say to people")
+        return people, self.ask_json(*words, code=code)
+
+    def ask_json(self, *words, code=DONE):
+        lines = self.run("--json", *words, code=code).strip().splitlines()
+        self.test.assertTrue(lines, f"{words} has nothing to say with --json")
+        return [json.loads(line) for line in lines][-1]
+
+
+class EveryVerb(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.processes, _ = cls.enterClassContext(under_test.cell_under_test(BUILD))
+        cls.folder = cls.processes.folder
+        shell = Lambdajet(cls("test_accuracy"), cls.folder)
+        shell.run("machine", "state", code=WRONG_STATE)  # nothing is referenced yet
+        shell.run("machine", "reset")
+        cls.program = cls.folder / "verify.ngc"
+        shell.run("calibration", "verify", "--program", cls.program, "--looks", 2)
+        submitted = shell.ask_json("job", "submit", cls.program, "--name", "two marks", "--request-id", "one")
+        cls.job, cls.plan = submitted["job_id"], submitted["plan_id"]
+        for verb in ("hold", "resume"):
+            shell.run("job", verb, cls.job, code=WRONG_STATE)
+        shell.run("inspection", "begin", cls.plan)
+        shell.run("job", "start", cls.job)
+        cls.watched = shell.run("job", "watch", cls.job, code=(DONE, WRONG_STATE))
+        for _ in range(3):  # this host may stand still while the sheet moves; resuming is one of the verbs
+            if "INTERRUPTED" not in cls.watched.splitlines()[-1]:
+                break
+            shell.run("job", "resume", cls.job)
+            cls.watched += shell.run("job", "watch", cls.job, code=(DONE, WRONG_STATE))
+
+    def setUp(self):
+        self.lambdajet = Lambdajet(self, self.folder)
+
+    def test_job(self):
+        ask, run, job = self.lambdajet.ask, self.lambdajet.run, self.job
+        self.assertIn("COMPLETED", self.watched.splitlines()[-1])
+        again = self.lambdajet.ask_json("job", "submit", self.program, "--name", "two marks", "--request-id", "one")
+        self.assertEqual(again["job_id"], job, "the same request id is the same job")
+        people, shown = ask("job", "show", job)
+        self.assertIn(f"{job} COMPLETED", people)
+        self.assertEqual((shown["state"], shown["progress"]), ("JOB_STATE_COMPLETED", 1))
+        self.assertNotIn("bound 0.000", people, "nobody predicted this bound")
+        people, listed = ask("job", "list", "--all")
+        self.assertIn("two marks", people)
+        self.assertIn(job, [one["job_id"] for one in listed["jobs"]])
+        run("job", "list", "--state", "NONSENSE", code=REFUSED)
+        trace, events = self.folder / "trace.csv", self.folder / "events.csv"
+        _, report = ask("job", "report", job, "--trace", trace, "--events", events)
+        self.assertGreater(report["duration_s"], 1)
+        self.assertTrue(trace.read_text().startswith("time_s,actuator_1_mm,"))
+        self.assertGreater(len(trace.read_text().splitlines()), 30)
+        self.assertIn("deviation_mm", events.read_text())
+        self.assertEqual(self.lambdajet.ask_json("job", "watch", job)["state"], "JOB_STATE_COMPLETED")
+        self.assertIn("COMPLETED", run("job", "start", job), "asked twice, started once")
+        run("job", "cancel", job, code=WRONG_STATE)
+        run("job", "show", "job-999999", code=REFUSED)
+        self.assertIn("0.80", run("job", "override", 0.8))
+        self.assertEqual(self.lambdajet.ask_json("job", "override", 1)["feed_override"], 1)
+        run("job", "override", 7, code=REFUSED)
+
+    def test_job_cancelled_before_it_ran(self):
+        ready = self.lambdajet.ask_json("job", "submit", self.program, "--request-id", "two")["job_id"]
+        self.assertIn("CANCELLED", self.lambdajet.run("job", "cancel", ready))
+
+    def test_machine_stop_and_reset(self):
+        ask = self.lambdajet.ask
+        people, state = ask("machine", "state")
+        self.assertIn("may start", people)
+        self.assertEqual(state["vetoes"], [])
+        modes = {node["name"]: node["mode"] for node in state["nodes"]}
+        self.assertEqual((modes["trajectory"], modes["calibration"]), ("SERVING", "SERVING"))
+        ask("job", "stop")
+        people, stopped = ask("machine", "state", code=WRONG_STATE)
+        self.assertIn("reset the machine", people)
+        self.assertTrue(stopped["vetoes"])
+        self.assertEqual(self.lambdajet.ask_json("machine", "reset")["vetoes"], [])
+
+    def test_calibration(self):
+        ask, run, plan = self.lambdajet.ask, self.lambdajet.run, self.plan
+        people, verdict = ask("calibration", "verify", "--plan", plan, code=(DONE, WRONG_STATE))
+        self.assertTrue(people.startswith(verdict["verdict"]))
+        self.assertGreater(verdict["degrees_of_freedom"], 0)
+        self.assertIn("G21", run("calibration", "verify", "--program", "-"))
+        self.assertIn("G21", self.lambdajet.ask_json("calibration", "verify", "--program", "-")["program"])
+        _, planned = ask("calibration", "plan", "--looks", 4, "--trial-pierces", 0, "--skip-elasticity")
+        self.assertIn("M100", planned["program"])
+        people, runs = ask("calibration", "runs")
+        self.assertIn(plan, people)
+        self.assertGreater(runs["runs"][0]["looks"], 50)
+        people, looks = ask("calibration", "runs", "--plan", plan)
+        self.assertTrue(people.startswith("mark,exposure_ns,seen,x_C_mm,"))
+        self.assertEqual(len(people.splitlines()) - 1, len(looks["looks"]))
+        for words in (("identify", "--plan", plan), ("identify", "--plan", 1), ("activate", 99), ("show", 99), ("diff", 0, 99)):
+            run("calibration", *words, code=REFUSED)
+            run("--json", "calibration", *words, code=REFUSED)
+        people, versions = ask("calibration", "versions")
+        self.assertIn("machine file", people)
+        self.assertTrue(versions["versions"][0]["active"])
+        people, shown = ask("calibration", "show")
+        self.assertIn("main_link_length_mm", people)
+        self.assertEqual(run("calibration", "show", "--yaml").strip(), shown["machine_yaml"].strip())
+        self.assertEqual({one["name"] for one in ask("calibration", "diff", 0, 0)[1]["parameters"]},
+                         {one["name"] for one in shown["parameters"]})
+        self.assertEqual(ask("calibration", "activate", 0, "--author", "a test")[1]["model_version"]["version"], 0)
+
+    def test_accuracy(self):
+        ask, run = self.lambdajet.ask, self.lambdajet.run
+        cutting = self.lambdajet.ask_json("job", "submit", under_test.SOURCE / "tests" / "system" / "kill_plate.ngc", "--request-id", "cut")
+        people, predicted = ask("accuracy", "ask-predict", cutting["plan_id"], "--draws", 50)
+        self.assertGreater(predicted["predicted_95_mm"], 0.1)
+        self.assertIn(f"{predicted['predicted_95_mm']:.4f}", people)
+        self.assertIn("NO_CUTTING", run("accuracy", "ask-predict", self.plan))
+        run("accuracy", "ask-predict", 1, code=REFUSED)
+        people, error_map = ask("accuracy", "ask-map", "--columns", 3, "--rows", 3)
+        self.assertEqual(len(people.splitlines()), 10)
+        self.assertEqual(len(error_map["values"]), 36)
+        run("accuracy", "ask-map", "--columns", 1, code=REFUSED)
+        people, budget = ask("accuracy", "ask-budget", "--shift-mm", 0.3, 0, 0, 0.4)
+        self.assertAlmostEqual(budget["base_mm"], 0.5)
+        self.assertIn("0.5000 mm", people)
+
+    def test_inspection(self):
+        ask, run, plan = self.lambdajet.ask, self.lambdajet.run, self.plan
+        people, ended = ask("inspection", "end", plan)
+        self.assertGreater(int(ended["samples"]), 1000)
+        people = run("inspection", "path", plan)
+        self.assertTrue(people.startswith("time_s,x_W_mm,y_W_mm,jet_on\n"))
+        rows = [json.loads(line)["values"] for line in run("--json", "inspection", "path", plan).splitlines()]
+        self.assertEqual(sum(len(batch) // 4 for batch in rows), len(people.splitlines()) - 1)
+        _, found = ask("inspection", "ask-compare", plan, "--drawing", DRAWING, "--deviations", self.folder / "deviations.csv")
+        self.assertGreater(found["all"]["not_cut"], 0, "the camera cuts nothing")
+        self.assertIn("deviation_mm", (self.folder / "deviations.csv").read_text())
+        run("inspection", "ask-compare", 1, "--drawing", DRAWING, code=REFUSED)
+        self.assertIn("kept from now on", run("inspection", "begin", 4711))
+        self.lambdajet.ask_json("inspection", "begin", 4711)
+        run("inspection", "path", 4711, code=REFUSED)
+
+    def test_a_service_that_is_not_there_is_named(self):
+        said = Lambdajet(self, self.folder).run("--address", "cell=127.0.0.1:1", "--timeout", 5, "job", "list", code=UNREACHABLE)
+        self.assertRegex(said, "cell at 127.0.0.1:1 does not answer")
+
+
+if __name__ == "__main__":
+    unittest.main()
