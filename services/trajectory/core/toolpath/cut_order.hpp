@@ -1,0 +1,34 @@
+// Orders cuts for the shortest idle travel, part by part, holes before the outline around them.
+//
+// Model: a travelling salesman's path with precedence: parts in sequence, a part inside another's hole before that part; in a
+// part the holes, then the outline. Nearest neighbour and the drawing's own order are both improved by 2-opt (a stretch
+// reversed) and Or-opt (up to three moved) until neither gains, and the shorter is taken; so the result is never longer than
+// the drawing's order. No random numbers: the same cuts give the same order.
+// Frames: W. Units: mm. Threads: pure. Cost: about n^3 up to some 300 parts;
+// above, only what stands near in the sequence is exchanged; above 3000, nearest neighbour alone.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <vector>
+
+namespace lambdajet::trajectory {
+
+struct CutStop {
+  Eigen::Vector2d entry_mm = Eigen::Vector2d::Zero();
+  Eigen::Vector2d exit_mm = Eigen::Vector2d::Zero();
+  int part = 0;
+  int enclosing_part = 0;  // whose hole it lies in; 0: none
+  bool hole = false;
+};
+
+struct CutOrder {
+  std::vector<std::size_t> sequence;
+  double idle_mm = 0.0;
+  double drawing_idle_mm = 0.0;  // had the drawing's order been kept
+};
+
+// `shortest` false keeps the drawing's order as far as inner before outer allows.
+CutOrder OrderCuts(const std::vector<CutStop>& cuts, const Eigen::Vector2d& home_mm, bool shortest);
+
+}  // namespace lambdajet::trajectory

@@ -1,0 +1,1 @@
+lambdajet_fuzz_target(trajectory_drawing MUTATIONS 150 DEPS trajectory_drawing)

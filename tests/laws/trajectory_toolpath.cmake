@@ -1,0 +1,1 @@
+lambdajet_check(laws_trajectory_toolpath LABELS laws SOURCES trajectory_toolpath_test.cpp DEPS trajectory_core)

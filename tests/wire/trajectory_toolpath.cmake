@@ -1,0 +1,2 @@
+lambdajet_check(wire_trajectory_toolpath LABELS wire SOURCES trajectory_toolpath_drawings_test.cpp
+  DEPS trajectory_drawing trajectory_core platform_machine_file)

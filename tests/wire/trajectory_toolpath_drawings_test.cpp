@@ -1,0 +1,207 @@
+// Drawings in, toolpaths out: every wrong drawing is refused by name, the shipped ones become plans, insertions are exact.
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <fstream>
+#include <numbers>
+#include <sstream>
+#include <string>
+
+#include "tests/support/demo_machine.hpp"
+#include "trajectory/core/feed/plan_program.hpp"
+#include "trajectory/core/toolpath/program_text.hpp"
+#include "trajectory/drawing/dxf_file.hpp"
+
+namespace lambdajet::trajectory {
+namespace {
+
+using Eigen::Vector2d;
+constexpr double kPi = std::numbers::pi;
+
+std::string Source(const std::string& path) {
+  return std::string(std::getenv("LAMBDAJET_SOURCE_DIR")) + "/" + path;
+}
+std::string Content(const std::string& path) {
+  std::ifstream file(Source(path), std::ios::binary);
+  EXPECT_TRUE(file.good()) << path;
+  std::stringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+std::vector<Finding> AllFindings(const std::string& dxf, const ContourOptions& contours = {}) {
+  const Drawing drawing = ReadDxf(dxf);
+  const ContourSet set = FindContours(drawing, contours);
+  std::vector<Finding> findings = set.findings;
+  if (!set.blocked()) {
+    const Toolpath toolpath = MakeToolpath(drawing, set, {});
+    findings.insert(findings.end(), toolpath.findings.begin(), toolpath.findings.end());
+  }
+  return findings;
+}
+
+std::string Group(int code, const std::string& value) { return std::to_string(code) + "\n" + value + "\n"; }
+std::string Dxf(const std::string& entities, const std::string& blocks = "") {
+  return Group(0, "SECTION") + Group(2, "HEADER") + Group(9, "$INSUNITS") + Group(70, "4") +
+         Group(0, "ENDSEC") + Group(0, "SECTION") + Group(2, "BLOCKS") + blocks + Group(0, "ENDSEC") +
+         Group(0, "SECTION") + Group(2, "ENTITIES") + entities + Group(0, "ENDSEC") + Group(0, "EOF");
+}
+
+TEST(WrongDrawings, AreRefusedWithTheirReason) {
+  std::istringstream table(Content("tests/wire/wrong_drawings/expected.csv"));
+  std::string row;
+  std::getline(table, row);
+  int count = 0;
+  while (std::getline(table, row)) {
+    const std::string name = row.substr(0, row.find(','));
+    const std::string reason = row.substr(name.size() + 1, row.find(',', name.size() + 1) - name.size() - 1);
+    SCOPED_TRACE(name);
+    std::vector<std::string> blocking;
+    for (const Finding& f : AllFindings(Content("tests/wire/wrong_drawings/" + name + ".dxf"))) {
+      if (f.blocks) {
+        blocking.emplace_back(f.reason);
+        EXPECT_FALSE(f.message.empty());
+        EXPECT_TRUE(f.at_mm.allFinite());
+      }
+    }
+    EXPECT_THAT(blocking, testing::Contains(reason));
+    ++count;
+  }
+  EXPECT_GE(count, 85);
+}
+
+TEST(WrongDrawings, TooManyVerticesAndNumbersAreRefusedBeforeTheLibrarySeesThem) {
+  std::string polyline = Group(0, "LWPOLYLINE") + Group(8, "CUT") + Group(70, "1");
+  for (int i = 0; i < 32'001; ++i) {
+    polyline += Group(10, std::to_string(i % 97)) + Group(20, std::to_string(i / 97));
+  }
+  const Drawing drawing = ReadDxf(Dxf(polyline));
+  ASSERT_EQ(drawing.findings.size(), 1u);
+  EXPECT_EQ(drawing.findings[0].reason, "TOO_MANY_VERTICES");
+  EXPECT_TRUE(drawing.entities.empty());
+}
+
+TEST(WrongDrawings, FindingsNamePlaceLayerAndLine) {
+  const auto findings = AllFindings(Content("tests/wire/wrong_drawings/hole_too_small.dxf"));
+  ASSERT_FALSE(findings.empty());
+  EXPECT_EQ(findings[0].layer, "CUT");
+  EXPECT_EQ(findings[0].entity, "CIRCLE");
+  EXPECT_GT(findings[0].line, 20u);
+  EXPECT_NEAR((findings[0].at_mm - Vector2d(25, 25)).norm(), 0.3, 1e-9);
+  EXPECT_DOUBLE_EQ(findings[0].size_mm, 0.4);
+}
+
+TEST(Drawings, WhatIsDrawnTwiceIsCutOnceAndTold) {
+  std::string circle =
+      Group(0, "CIRCLE") + Group(8, "CUT") + Group(10, "20") + Group(20, "20") + Group(40, "9");
+  const Drawing drawing = ReadDxf(Dxf(circle + circle));
+  const ContourSet set = FindContours(drawing, {});
+  EXPECT_EQ(set.contours.size(), 1u);
+  ASSERT_EQ(set.findings.size(), 1u);
+  EXPECT_EQ(set.findings[0].reason, "DUPLICATE_ENTITY");
+  EXPECT_FALSE(set.findings[0].blocks);
+}
+
+// The library keeps single precision; the table brings the file's doubles back.
+TEST(Drawings, CoordinatesAreTheFilesDoubles) {
+  const Drawing drawing =
+      ReadDxf(Dxf(Group(0, "LINE") + Group(8, "CUT") + Group(10, "123456.123456789") + Group(20, "-0.1") +
+                  Group(11, "3.3333333333333335") + Group(21, "1e-7")));
+  ASSERT_EQ(drawing.entities.size(), 1u);
+  const auto& line = std::get<LineCurve>(drawing.entities[0].curves[0]);
+  EXPECT_EQ(line.from, Vector2d(123456.123456789, -0.1));
+  EXPECT_EQ(line.to, Vector2d(3.3333333333333335, 1e-7));
+}
+
+TEST(Drawings, InsertionsTurnScaleMirrorNestAndRepeat) {
+  const std::string inner = Group(0, "BLOCK") + Group(2, "INNER") + Group(10, "1") + Group(20, "2") +
+                            Group(0, "CIRCLE") + Group(8, "0") + Group(10, "3") + Group(20, "2") +
+                            Group(40, "1") + Group(0, "ENDBLK");
+  const std::string outer = Group(0, "BLOCK") + Group(2, "OUTER") + Group(10, "0") + Group(20, "0") +
+                            Group(0, "INSERT") + Group(8, "0") + Group(2, "INNER") + Group(10, "10") +
+                            Group(20, "0") + Group(50, "90") + Group(0, "ENDBLK");
+  const std::string insert = Group(0, "INSERT") + Group(8, "SPECIAL") + Group(2, "OUTER") + Group(10, "100") +
+                             Group(20, "50") + Group(41, "2") + Group(42, "-3") + Group(50, "180") +
+                             Group(70, "2") + Group(71, "3") + Group(44, "200") + Group(45, "100");
+  const Drawing drawing = ReadDxf(Dxf(insert, inner + outer));
+  ASSERT_EQ(drawing.entities.size(), 6u);
+  // Centre in INNER (3, 2), base (1, 2), so (2, 0); turned by 90 degrees (0, 2); placed (10, 2); scaled (20, -6); turned (-20, 6).
+  for (int k = 0; k < 6; ++k) {
+    const auto& conic = std::get<ConicCurve>(drawing.entities[static_cast<std::size_t>(k)].curves[0]);
+    const Vector2d expected = Vector2d(100 - 20, 50 + 6) - Vector2d(200.0 * (k % 2), 100.0 * (k / 2));
+    EXPECT_NEAR((conic.center - expected).norm(), 0.0, 1e-9) << k;
+    EXPECT_EQ(drawing.entities[static_cast<std::size_t>(k)].layer, "SPECIAL");
+  }
+  ContourOptions options;
+  options.curve_tolerance_mm = 1e-4;
+  const ContourSet set = FindContours(drawing, options);
+  ASSERT_EQ(set.contours.size(), 6u);
+  EXPECT_NEAR(SignedArea_mm2(set.contours[0].pieces), kPi * 2.0 * 3.0, 1e-3);  // an ellipse now
+}
+
+TEST(Drawings, EllipsesAndSplinesStayWithinTheToleranceAndSmooth) {
+  const Drawing drawing = ReadDxf(Content("deploy/parts/mixed_nest.dxf"));
+  ASSERT_TRUE(drawing.findings.empty());
+  for (const double tolerance_mm : {0.05, 0.005, 0.0005}) {
+    for (const DrawingEntity& entity : drawing.entities) {
+      Pieces pieces;
+      ASSERT_TRUE(AppendPieces(entity.curves[0], tolerance_mm, 0, pieces));
+      if (entity.type != "ELLIPSE" && entity.type != "SPLINE") {
+        continue;
+      }
+      for (std::size_t i = 0; i < pieces.size(); ++i) {
+        const Piece& next = pieces[(i + 1) % pieces.size()];
+        EXPECT_LT((pieces[i].to_mm - next.from_mm).norm(), 1e-9);
+        EXPECT_LT(std::abs(TurnBetween(TangentAt(pieces[i], 1.0), TangentAt(next, 0.0))), 1e-6);
+      }
+      if (const auto* c = std::get_if<ConicCurve>(&entity.curves[0])) {
+        for (int k = 0; k < 1000; ++k) {
+          const double t = 2.0 * kPi * k / 1000;
+          double nearest = 1e300;
+          for (const Piece& piece : pieces) {
+            nearest = std::min(nearest, Distance(piece, c->center + std::cos(t) * c->u + std::sin(t) * c->v));
+          }
+          EXPECT_LE(nearest, tolerance_mm);
+        }
+      }
+    }
+  }
+}
+
+TEST(ShippedDrawings, BecomePlansOfTheShippedMachine) {
+  const MachineDescription machine = tests::DemoMachine();
+  for (const std::string name : {"slotted_plate", "mixed_nest"}) {
+    SCOPED_TRACE(name);
+    const Drawing drawing = ReadDxf(Content("deploy/parts/" + name + ".dxf"));
+    ContourOptions contours;
+    contours.ignore_layers = {"CENTRE"};
+    contours.mark_layers = {"SCRIBE"};
+    const ContourSet set = FindContours(drawing, contours);
+    ASSERT_FALSE(set.blocked());
+    for (const PierceKind pierce : {PierceKind::kStationary, PierceKind::kMoving}) {
+      ToolpathOptions options;
+      options.pierce = pierce;
+      options.tab_count = 2;
+      const Toolpath toolpath = MakeToolpath(drawing, set, options);
+      ASSERT_FALSE(toolpath.blocked());
+      EXPECT_LE(toolpath.idle_mm, toolpath.drawing_idle_mm);
+      const std::string program = ProgramText(set, toolpath, options, name);
+      const Admission admission = AdmitPartProgram(program, machine, {});
+      ASSERT_TRUE(admission.faults.empty()) << admission.faults[0].line << " " << admission.faults[0].reason;
+      EXPECT_EQ(admission.pierce_count,
+                pierce == PierceKind::kStationary ? static_cast<unsigned>(toolpath.pierce_count) : 0u);
+      const PlannedProgram plan = PlanPartProgram(program, machine, {});
+      ASSERT_TRUE(plan.faults.empty());
+      EXPECT_GT(plan.plan.segments.size(), 100u);
+      double mark_mm = 0.0;
+      for (const Pieces& mark : set.marks) {
+        mark_mm += Length(mark);
+      }
+      EXPECT_NEAR(plan.cutting_length_mm, toolpath.cut_mm, 0.5 + 0.01 * toolpath.cut_mm + mark_mm);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace lambdajet::trajectory
