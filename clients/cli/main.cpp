@@ -25,6 +25,7 @@ int main(int count, char** words) {
   CLI::App& inspection = noun("inspection", "the contour really cut against the drawing");
   AddKinematicsVerbs(noun("kinematics", "poses, sliders, singularities, workspace"), output);
   AddTrajectoryVerbs(trajectory, output);
+  AddDrawingVerbs(trajectory, output);
   AddTrajectoryServiceVerbs(trajectory, output, connections);
   AddCalibrationVerbs(calibration, output);
   AddCalibrationServiceVerbs(calibration, output, connections);
