@@ -318,8 +318,8 @@ absl::Status Sweep(const SweepOptions& options, Output& output) {
                 Tone::kBad);
     output.Exit(ExitCode::kRefused);
   } else {
-    output.Text(fmt::format("the sheet passes; nearest to body {} after row {}, about {} mm", answer.body + 1,
-                            answer.stretch + 1, Fixed(answer.clearance_mm, 1)),
+    output.Text(fmt::format("the sheet passes; nearest to body {} after row {}, {} mm", answer.body + 1,
+                            answer.stretch + 1, Fixed(answer.clearance_mm, 3)),
                 Tone::kGood);
   }
   return absl::OkStatus();

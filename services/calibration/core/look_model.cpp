@@ -41,7 +41,7 @@ EffectorPlace PlaceEffector(const MachineDescription& machine, const ParameterVe
   const auto assembly = lambda::Assemble(geometry, q, static_cast<double>(machine.assembly_mode),
                                          lambda::RailsApart(p[0].a, p[4].a, p[6].a));
   // Written so that a distance of zero, whose quotient is NaN, is refused too.
-  if (!(assembly.distance_mm.a > 0.0 && assembly.height_2_mm2.a > 0.0)) {
+  if (!(assembly.distance_2_mm2.a > 0.0 && assembly.height_2.a > 0.0)) {
     return place;
   }
   place.p_DE_mm = {assembly.tool.x.a, assembly.tool.y.a};

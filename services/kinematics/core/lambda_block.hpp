@@ -50,6 +50,7 @@ Rail<S> Widen(const Rail<double>& r) {
 }
 
 inline double Magnitude(double a) { return a < 0.0 ? -a : a; }
+inline double Square(double a) { return a * a; }
 
 // What a step needs, spread over all lanes once a block.
 template <int N>
@@ -60,8 +61,8 @@ struct Step {
   bool rails_apart;
   S margin_mm;  // the singular margin, wider by rounding
   S coincidence_mm;
-  S skew;                     // |u_1 . n_2|
-  S shortest_mm, longest_mm;  // of the sliders' distance
+  S skew;                           // |u_1 . n_2|
+  S shortest_2_mm2, longest_2_mm2;  // of the sliders' distance, squared
   S q1_min_mm, q1_max_mm, q2_min_mm, q2_max_mm;
 
   explicit Step(const BlockMechanism& m)
@@ -75,8 +76,8 @@ struct Step {
         coincidence_mm(1e-6 * m.geometry.main_mm),
         skew(Magnitude(m.geometry.rail_1.sine * m.geometry.rail_2.cosine -
                        m.geometry.rail_1.cosine * m.geometry.rail_2.sine)),
-        shortest_mm(Magnitude(m.attach_mm - m.geometry.second_mm) + 1e-6 * m.geometry.main_mm),
-        longest_mm(m.attach_mm + m.geometry.second_mm - 1e-6 * m.geometry.main_mm),
+        shortest_2_mm2(Square(Magnitude(m.attach_mm - m.geometry.second_mm) + 1e-6 * m.geometry.main_mm)),
+        longest_2_mm2(Square(m.attach_mm + m.geometry.second_mm - 1e-6 * m.geometry.main_mm)),
         q1_min_mm(m.q1_min_mm),
         q1_max_mm(m.q1_max_mm),
         q2_min_mm(m.q2_min_mm),
@@ -111,33 +112,41 @@ LaneMask<N> ClearOnStraightRail(const Step<N>& t, const Pose<Lanes<N>>& p) {
          (Lanes<N>(t.assembly) * p.across_1_mm > t.margin_mm) & (Abs(forward) > t.coincidence_mm);
 }
 
-// |grad a_2| <= l + (1 - l) skew |g_1| with |g_1| = main/c, and
-// grad f = (e.r)/|D| [(e x u_1) p_1 - (e x u_2) p_2] + e_perp - (e x u_1) p_1, bounded term by term.
+// On the way to the second link's type 1 line |grad a_2| <= l + (1 - l) skew main/c, and within the margin m of a tool whose
+// main link is e short of its line c is no less than c (e - m)/e. For type 2, f being the tool's distance from the line of
+// the sliders, D from slider 1 to 2 and e its direction,
+//     grad f = (e.r)/|D| [(e x u_1) p_1 - (e x u_2) p_2] + e_perp - (e x u_1) p_1,
+// bounded term by term with |p_1| <= main/c and |p_2| <= second/d (l + (1 - l) main/c). Both sides are multiplied by c d, and
+// |D| is replaced by bounds, so that neither root nor division is needed.
 template <int N>
 LaneMask<N> ClearOnAnyRails(const Step<N>& t, const Pose<Lanes<N>>& p) {
-  const Lanes<N> one(1.0);
   const auto& rail_1 = t.g.rail_1;
   const auto& rail_2 = t.g.rail_2;
-  const auto rest = one - t.g.ratio;
+  const auto rest = Lanes<N>(1.0) - t.g.ratio;
   const auto link_1 = t.g.main_mm - Abs(p.across_1_mm);
   const auto link_2 = t.g.second_mm - Abs(p.across_2_mm);
-  const auto serial = (link_1 > t.margin_mm) &
-                      (link_2 * p.c_mm > t.margin_mm * (t.g.ratio * p.c_mm + rest * t.skew * t.g.main_mm));
+  const auto serial =
+      (link_1 > t.margin_mm) & ((link_2 - t.margin_mm * t.g.ratio) * p.c_mm * (link_1 - t.margin_mm) >
+                                t.margin_mm * rest * t.skew * t.g.main_mm * link_1);
   const auto dx = p.slider_2.x - p.slider_1.x;
   const auto dy = p.slider_2.y - p.slider_1.y;
   const auto rx = p.tool.x - p.slider_1.x;
   const auto ry = p.tool.y - p.slider_1.y;
-  const auto distance = sqrt(dx * dx + dy * dy);
-  const auto inverse = one / distance;
-  const auto slope_1 = t.g.main_mm / p.c_mm;
-  const auto slope_2 = t.g.second_mm / p.d_mm * (t.g.ratio + rest * slope_1);
-  const auto tilt_1 = Abs(dx * rail_1.sine - dy * rail_1.cosine) * inverse * slope_1;
-  const auto tilt_2 = Abs(dx * rail_2.sine - dy * rail_2.cosine) * inverse * slope_2;
-  const auto lever = Abs(dx * rx + dy * ry) * inverse * inverse;
   const auto forward = dx * rail_1.cosine + dy * rail_1.sine;
-  const auto side = SideOf(forward, t.assembly, t.rails_apart) * (dx * ry - dy * rx) * inverse;
-  return serial & (side > t.margin_mm * (one + tilt_1 + lever * (tilt_1 + tilt_2))) &
-         (distance > t.coincidence_mm);
+  const auto off_1 = Abs(dx * rail_1.sine - dy * rail_1.cosine);
+  const auto off_2 = Abs(dx * rail_2.sine - dy * rail_2.cosine);
+  const auto least = Select(Abs(forward) > off_1, Abs(forward), off_1);
+  const auto most = Abs(forward) + off_1;
+  const auto cd = p.c_mm * p.d_mm;
+  const auto tilt_1 = off_1 * t.g.main_mm * p.d_mm;                                       // times |D| c d
+  const auto tilt_2 = off_2 * t.g.second_mm * (t.g.ratio * p.c_mm + rest * t.g.main_mm);  // likewise
+  const auto lever = Abs(dx * rx + dy * ry);                                              // times |D|^2
+  const auto least_2 = least * least;
+  const auto moment = SideOf(forward, t.assembly, t.rails_apart) * (dx * ry - dy * rx);  // f |D|
+  return serial &
+         (moment * cd * least_2 * least >
+          t.margin_mm * most * (cd * least_2 * least + tilt_1 * least_2 + lever * (tilt_1 + tilt_2))) &
+         (least > t.coincidence_mm);
 }
 
 template <bool kStraight, int N>
@@ -179,8 +188,8 @@ LaneMask<N> ForwardStep(const Step<N>& t, const Pairs<N>& readings, Pairs<N>& to
                          (a.slider_2.y - a.attachment.y) * rail_2.sine);
   const Pose<S> pose{a.tool, a.slider_1, a.slider_2, Across(rail_1, a.tool), Across(rail_2, a.attachment),
                      c,      d};
-  const auto closed =
-      (c > S(0.0)) & (d > S(0.0)) & (a.distance_mm > t.shortest_mm) & (a.distance_mm < t.longest_mm);
+  const auto closed = (c > S(0.0)) & (d > S(0.0)) & (a.distance_2_mm2 > t.shortest_2_mm2) &
+                      (a.distance_2_mm2 < t.longest_2_mm2);
   return Finite(readings.first, readings.second) & closed & ClearOfSingularities<kStraight>(t, pose) &
          WithinTravel(t, readings.first, readings.second);
 }

@@ -6,9 +6,10 @@
 //     dp_1/dT = g_1,  dp_2/dP = g_2,  dP = l dT + (1 - l) u_1 dp_1,  det J = l (g_1 x g_2)
 //     d2p_1 = s1 main^2/c^3 (n_1.v)^2,  d2p_2 = g_2.d2P - s2 second^2/d^3 (n_2.P')^2
 // which on one rail are seed paper 000, (60), (61) corrected and det J = -l y [s1/c + s2 l/d].
-// The distance to a locus f = 0 is f/|grad f|: exact where the locus is a line parallel to parallel rails, of
-// first order in the rails' relative angle otherwise. Frames: D. Units: mm, rad. Threads: pure. Cost: no
-// allocation.
+// Distances to the type 1 lines are exact: on parallel rails the lines are straight; with rails at an angle the second
+// link's is found by projection (NearestSecondLine). The type 2 distance here is f/|grad f|, exact on one straight rail and
+// of first order otherwise; lambda_mechanism.cpp's RefineParallelDistance makes it exact. Frames: D. Units: mm, rad.
+// Threads: pure. Cost: no allocation.
 #pragma once
 
 #include <Eigen/Core>
@@ -77,17 +78,54 @@ inline void SetJacobians(const Geometry<double>& g, const Closure<double>& k, Wo
   }
 }
 
-inline void SetSerialDistances(const Geometry<double>& g, const Closure<double>& k, Differential& d) {
-  d.main_distance_mm = g.main_mm - std::abs(k.across_1_mm);
-  // Across rail 2 the attachment moves with the tool by l n_2 + (1 - l)(u_1.n_2) g_1; for parallel rails by l
-  // n_2.
-  Eigen::Vector2d gradient = g.ratio * Normal(g.rail_2);
-  const double skew = Direction(g.rail_1).dot(Normal(g.rail_2));
-  if (d.differentiable && skew != 0.0) {
-    gradient += (1.0 - g.ratio) * skew * d.g_1;
+// Distance to the line on which the second link is square to its rail, |a_2| = second, in rail 1's axes (x along it, a
+// across it): with sin and cos of rail 2's angle against rail 1's, kappa = +-1 the sign of a_2,
+//     f(x, a) = second - kappa (cos l a - sin (x - (1 - l) s1 sqrt(main^2 - a^2)) + a_2 of the origin).
+// The nearest point is where the way to it is along grad f: repeatedly the tool is put onto the tangent at the point before.
+// Nothing is found where the line ends before (the main link is square to its rail there, and nearer): the first step
+// stands.
+inline double NearestSecondLine(const Geometry<double>& g, const Closure<double>& k, double s1, double sine) {
+  constexpr int kSteps = 30;
+  const double cosine = g.rail_1.cosine * g.rail_2.cosine + g.rail_1.sine * g.rail_2.sine;
+  const double kappa = k.across_2_mm < 0.0 ? -1.0 : 1.0;
+  const double rest = (1.0 - g.ratio) * s1;
+  const double f_tool = g.second_mm - std::abs(k.across_2_mm);
+  double step_x = 0.0, step_a = 0.0;  // from the tool to the point
+  double f = f_tool;
+  double root = k.root_1_mm;
+  double first = 0.0;
+  double distance = 0.0;
+  for (int i = 0; i < kSteps; ++i) {
+    const double slope_x = kappa * sine;
+    const double slope_a = -kappa * (cosine * g.ratio - sine * rest * (k.across_1_mm + step_a) / root);
+    const double slope2 = slope_x * slope_x + slope_a * slope_a;
+    const double length = (f - slope_x * step_x - slope_a * step_a) / slope2;
+    step_x = -length * slope_x;
+    step_a = -length * slope_a;
+    const double before = distance;
+    distance = length * std::sqrt(slope2);
+    first = i == 0 ? distance : first;
+    if (std::abs(distance - before) <= 1e-12 * g.main_mm) {
+      return distance;
+    }
+    const double a = k.across_1_mm + step_a;
+    const double root2 = (g.main_mm - a) * (g.main_mm + a);
+    if (!(root2 > 0.0)) {
+      return first;
+    }
+    root = std::sqrt(root2);
+    f = f_tool - kappa * (cosine * g.ratio * step_a - sine * (step_x - rest * (root - k.root_1_mm)));
   }
-  const double slope = gradient.norm();
-  d.second_distance_mm = slope > 0.0 ? (g.second_mm - std::abs(k.across_2_mm)) / slope : 0.0;
+  return first;
+}
+
+inline void SetSerialDistances(const Geometry<double>& g, const Closure<double>& k, WorkingMode mode,
+                               Differential& d) {
+  d.main_distance_mm = g.main_mm - std::abs(k.across_1_mm);
+  const double sine = Cross(Direction(g.rail_1), Direction(g.rail_2));
+  // Across parallel rails the attachment moves by l of the tool's way.
+  d.second_distance_mm = k.root_1_mm > 0.0 && sine != 0.0 ? NearestSecondLine(g, k, mode.s1, sine)
+                                                          : (g.second_mm - std::abs(k.across_2_mm)) / g.ratio;
 }
 
 inline void SetParallelDistance(const Geometry<double>& g, const Closure<double>& k, bool rails_apart,
@@ -128,7 +166,7 @@ inline Differential Differentiate(const Geometry<double>& g, const Closure<doubl
   if (d.differentiable) {
     SetJacobians(g, k, mode, d);
   }
-  SetSerialDistances(g, k, d);
+  SetSerialDistances(g, k, mode, d);
   SetParallelDistance(g, k, rails_apart, d);
   return d;
 }

@@ -152,29 +152,28 @@ struct Assembly {
   Point<S> attachment;
   Point<S> slider_1;
   Point<S> slider_2;
-  S distance_mm;   // |b_2 - b_1|
-  S height_2_mm2;  // attach^2 - foot^2; below 0 the triangle cannot be closed
+  S distance_2_mm2;  // |b_2 - b_1|^2
+  S height_2;        // (height / distance)^2; below 0 the triangle cannot be closed
 };
 
+// P = b_1 + k (b_2 - b_1) + h (b_2 - b_1 turned by +90 degrees): shares of the sliders' distance, so one root and one division
+// do.
 template <class S>
 Assembly<S> Assemble(const Geometry<S>& g, const Readings<S>& q, double assembly_mode, bool rails_apart) {
-  using std::sqrt;
   Assembly<S> a;
   a.slider_1 = OnRail(g.rail_1, S(q.q1_mm + g.rail_1.zero_mm));
   a.slider_2 = OnRail(g.rail_2, S(q.q2_mm + g.rail_2.zero_mm));
   const S dx = a.slider_2.x - a.slider_1.x;
   const S dy = a.slider_2.y - a.slider_1.y;
-  a.distance_mm = sqrt(dx * dx + dy * dy);
-  const S inverse = 1.0 / a.distance_mm;
-  const S ex = dx * inverse;
-  const S ey = dy * inverse;
+  a.distance_2_mm2 = dx * dx + dy * dy;
+  const S inverse = 1.0 / a.distance_2_mm2;
   const S attach = g.ratio * g.main_mm;
-  const S foot = 0.5 * (a.distance_mm + (attach - g.second_mm) * (attach + g.second_mm) * inverse);
-  a.height_2_mm2 = (attach - foot) * (attach + foot);
-  const S height = SideOf(S(dx * g.rail_1.cosine + dy * g.rail_1.sine), assembly_mode, rails_apart) *
-                   RootOrZero(a.height_2_mm2);
-  const S ax = foot * ex - height * ey;
-  const S ay = foot * ey + height * ex;
+  const S k = 0.5 + 0.5 * (attach - g.second_mm) * (attach + g.second_mm) * inverse;
+  a.height_2 = attach * attach * inverse - k * k;
+  const S h = SideOf(S(dx * g.rail_1.cosine + dy * g.rail_1.sine), assembly_mode, rails_apart) *
+              RootOrZero(a.height_2);
+  const S ax = k * dx - h * dy;
+  const S ay = k * dy + h * dx;
   a.attachment = {a.slider_1.x + ax, a.slider_1.y + ay};
   const S stretch = 1.0 / g.ratio;
   a.tool = {a.slider_1.x + ax * stretch, a.slider_1.y + ay * stretch};

@@ -50,30 +50,32 @@ void Judge(const LambdaMechanism& m, bool mode_matches, Answer& answer) {
   }
 }
 
-// The nearest point of the type 2 locus by Newton steps along the gradient: exact also where the sliders
-// stand on rails set apart and the locus lies between them, where one step is only of first order.
+// The nearest point of the type 2 locus: the tool is put onto the tangent at the point before until it stays, so that the
+// way there is along the gradient. Where that leads out of reach the first-order distance is all there is.
 double RefineParallelDistance(const LambdaMechanism& m, const Eigen::Vector2d& p_DE_mm,
                               const Differential& at) {
-  constexpr int kSteps = 8;
+  constexpr int kSteps = 60;
   if (!at.differentiable || at.parallel_gradient.squaredNorm() == 0.0) {
     return at.parallel_distance_mm;
   }
   Eigen::Vector2d p = p_DE_mm;
   Differential d = at;
   for (int i = 0; i < kSteps; ++i) {
-    const Eigen::Vector2d next = p - d.side_mm / d.parallel_gradient.squaredNorm() * d.parallel_gradient;
-    const auto k =
-        lambda::CloseInverse<double>(m.geometry, {next.x(), next.y()}, m.working_mode.s1, m.working_mode.s2);
-    d = lambda::Differentiate(m.geometry, k, m.working_mode, m.rails_apart);
+    const Eigen::Vector2d& g = d.parallel_gradient;
+    const Eigen::Vector2d next = p_DE_mm - (d.side_mm + g.dot(p_DE_mm - p)) / g.squaredNorm() * g;
+    const double moved = (next - p).norm();
     p = next;
-    if (!d.differentiable || d.parallel_gradient.squaredNorm() == 0.0) {
-      return at.parallel_distance_mm;  // the step left the reach: the first-order distance is all there is
+    if (moved < 1e-10) {
+      return std::copysign((p - p_DE_mm).norm(), at.side_mm);
     }
-    if (std::abs(d.side_mm) < 1e-10) {
+    const auto k =
+        lambda::CloseInverse<double>(m.geometry, {p.x(), p.y()}, m.working_mode.s1, m.working_mode.s2);
+    d = lambda::Differentiate(m.geometry, k, m.working_mode, m.rails_apart);
+    if (!d.differentiable || d.parallel_gradient.squaredNorm() == 0.0) {
       break;
     }
   }
-  return std::copysign((p - p_DE_mm).norm(), at.side_mm);
+  return at.parallel_distance_mm;
 }
 
 // Sliders nearer to each other than this stand in one place: with L2 = L3 the main link then turns freely
@@ -208,11 +210,12 @@ ForwardAnswer SolveForward(const LambdaMechanism& m, const Eigen::Vector2d& actu
   const double attach = g.ratio * g.main_mm;
   answer.travel_margin_mm = TravelMargin(m, q.q1_mm, q.q2_mm);
   const double shortest = std::abs(attach - g.second_mm);
-  if (a.distance_mm <= CoincidenceMm(g) && shortest <= CoincidenceMm(g)) {
+  const double distance = std::sqrt(a.distance_2_mm2);
+  if (distance <= CoincidenceMm(g) && shortest <= CoincidenceMm(g)) {
     answer.reason = Reason::kIndeterminate;
     return answer;
   }
-  answer.reach_margin_mm = std::min(a.distance_mm - shortest, attach + g.second_mm - a.distance_mm);
+  answer.reach_margin_mm = std::min(distance - shortest, attach + g.second_mm - distance);
   if (!(answer.reach_margin_mm >= 0.0)) {
     answer.reason = Reason::kOutOfReach;
     answer.excess_mm = -answer.reach_margin_mm;

@@ -11,39 +11,14 @@ namespace {
 
 using Eigen::Vector2d;
 
-double Cross(const Vector2d& a, const Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
+constexpr std::size_t kMostCorners = 64;
 
-// True if some edge of `polygon` has all of `other` on its outside.
-bool Separates(Corners polygon, const Vector2d& polygon_shift, Corners other, const Vector2d& other_shift) {
-  for (std::size_t i = 0; i < polygon.size(); ++i) {
-    const Vector2d edge = polygon[(i + 1) % polygon.size()] - polygon[i];
-    const bool outside = std::all_of(other.begin(), other.end(), [&](const Vector2d& p) {
-      return Cross(edge, p + other_shift - polygon[i] - polygon_shift) < 0.0;
-    });
-    if (outside) {
-      return true;
-    }
-  }
-  return false;
-}
+double Cross(const Vector2d& a, const Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
 
 double PointToEdge(const Vector2d& p, const Vector2d& a, const Vector2d& b) {
   const Vector2d edge = b - a;
   const double t = std::clamp((p - a).dot(edge) / edge.squaredNorm(), 0.0, 1.0);
   return (p - a - t * edge).norm();
-}
-
-// Between disjoint convex polygons a corner of one is nearest to an edge of the other.
-double NearestCorner(Corners corners, const Vector2d& corner_shift, Corners edges,
-                     const Vector2d& edge_shift) {
-  double nearest = std::numeric_limits<double>::max();
-  for (const Vector2d& p : corners) {
-    for (std::size_t i = 0; i < edges.size(); ++i) {
-      nearest = std::min(nearest, PointToEdge(p + corner_shift, edges[i] + edge_shift,
-                                              edges[(i + 1) % edges.size()] + edge_shift));
-    }
-  }
-  return nearest;
 }
 
 }  // namespace
@@ -59,7 +34,7 @@ std::array<Vector2d, 4> BodyCorners(double x_min_mm, double y_min_mm, double x_m
 }
 
 bool IsConvex(Corners polygon) {
-  if (polygon.size() < 3 || polygon.size() > 64) {
+  if (polygon.size() < 3 || polygon.size() > kMostCorners) {
     return false;
   }
   double turn = 0.0;
@@ -74,45 +49,129 @@ bool IsConvex(Corners polygon) {
   return turn < 7.0;  // once around, not twice
 }
 
-double Distance(Corners moving, const Vector2d& shift_mm, Corners fixed) {
-  const Vector2d none = Vector2d::Zero();
-  if (!Separates(moving, shift_mm, fixed, none) && !Separates(fixed, none, moving, shift_mm)) {
-    return 0.0;
-  }
-  return std::min(NearestCorner(moving, shift_mm, fixed, none), NearestCorner(fixed, none, moving, shift_mm));
-}
-
 namespace {
 
-// First fraction of the stretch at which the distance falls to the margin; above 1 if it never does. Keeps the smallest
-// distance seen.
-double FirstContact(Corners sheet, const Vector2d& from, const Vector2d& to, Corners body, double margin_mm,
-                    double& nearest) {
-  constexpr double kTouchMm = 1e-6;
-  constexpr double kLeastStepMm = 1e-3;
-  const double length = (to - from).norm();
-  const auto at = [&](double fraction) { return Distance(sheet, from + fraction * (to - from), body); };
-  double free = 0.0;  // the last fraction without contact
+// Two polygons are taken to touch at this distance; rounding is a thousandth of it.
+constexpr double kTouchMm = 1e-6;
+
+// The places of the tool at which the sheet overlaps one body: the body's Minkowski sum with the mirrored sheet, convex
+// again.
+struct Obstacle {
+  std::array<Vector2d, 2 * kMostCorners> corners;
+  std::size_t count = 0;
+
+  const Vector2d& At(std::size_t i) const { return corners[i < count ? i : i - count]; }
+};
+
+std::size_t Lowest(Corners polygon, double sign) {
+  const auto below = [sign](const Vector2d& a, const Vector2d& b) {
+    return sign * a.y() < sign * b.y() || (a.y() == b.y() && sign * a.x() < sign * b.x());
+  };
+  return static_cast<std::size_t>(std::min_element(polygon.begin(), polygon.end(), below) - polygon.begin());
+}
+
+// Edges of both polygons in the order of their directions, from the lowest corner on; a mirrored polygon turns the same way.
+Obstacle ObstacleOf(Corners sheet, Corners body) {
+  const std::size_t first_body = Lowest(body, 1.0), first_sheet = Lowest(sheet, -1.0);
+  const auto body_at = [&](std::size_t i) { return body[(first_body + i) % body.size()]; };
+  const auto mirrored_at = [&](std::size_t i) { return Vector2d(-sheet[(first_sheet + i) % sheet.size()]); };
+  Obstacle obstacle;
+  std::size_t b = 0, s = 0;
+  while (b < body.size() || s < sheet.size()) {
+    obstacle.corners[obstacle.count++] = body_at(b) + mirrored_at(s);
+    const Vector2d body_edge = body_at(b + 1) - body_at(b);
+    const Vector2d sheet_edge = mirrored_at(s + 1) - mirrored_at(s);
+    const double turn = Cross(body_edge, sheet_edge);
+    const bool take_body = b < body.size() && (s == sheet.size() || turn >= 0.0);
+    const bool take_sheet = s < sheet.size() && (b == body.size() || turn <= 0.0);
+    b += take_body ? 1 : 0;
+    s += take_sheet ? 1 : 0;
+  }
+  return obstacle;
+}
+
+double DistanceOf(const Obstacle& obstacle, const Vector2d& p) {
+  double nearest = std::numeric_limits<double>::max();
+  bool inside = true;
+  for (std::size_t i = 0; i < obstacle.count; ++i) {
+    const Vector2d& a = obstacle.At(i);
+    const Vector2d& b = obstacle.At(i + 1);
+    inside = inside && Cross(b - a, p - a) >= 0.0;
+    nearest = std::min(nearest, PointToEdge(p, a, b));
+  }
+  return inside ? 0.0 : nearest;
+}
+
+// Fractions of the way from `from` along `way` at which the tool is `reach` from a corner or an edge of the obstacle. Each
+// such place is no farther from the obstacle than that, so the least of them is the first contact.
+double FirstWithin(const Obstacle& obstacle, const Vector2d& from, const Vector2d& way, double reach) {
+  constexpr double kNever = std::numeric_limits<double>::max();
+  double first = kNever;
+  const double a = way.squaredNorm();
+  for (std::size_t i = 0; i < obstacle.count; ++i) {
+    const Vector2d& corner = obstacle.At(i);
+    const Vector2d edge = obstacle.At(i + 1) - corner;
+    const Vector2d outward = Vector2d(edge.y(), -edge.x()).normalized();
+    const double approach = -outward.dot(way);
+    if (approach > 0.0) {
+      const double t = (outward.dot(from - corner) - reach) / approach;
+      const double along = (from + t * way - corner).dot(edge);
+      if (t >= 0.0 && along >= 0.0 && along <= edge.squaredNorm()) {
+        first = std::min(first, t);
+      }
+    }
+    const double half_b = way.dot(from - corner);
+    const double root2 = half_b * half_b - a * ((from - corner).squaredNorm() - reach * reach);
+    if (a > 0.0 && root2 >= 0.0) {
+      const double t = (-half_b - std::sqrt(root2)) / a;
+      first = t >= 0.0 ? std::min(first, t) : first;
+    }
+  }
+  return first;
+}
+
+// Where the way comes nearest to an obstacle that it does not meet: at an end, or beside a corner.
+struct Nearest {
+  double distance_mm = 0.0;
   double fraction = 0.0;
-  while (true) {
-    const double distance = at(fraction);
-    nearest = std::min(nearest, distance);
-    if (distance <= margin_mm + kTouchMm) {
-      break;
+};
+Nearest NearestOn(const Obstacle& obstacle, const Vector2d& from, const Vector2d& way) {
+  Nearest nearest{DistanceOf(obstacle, from), 0.0};
+  const auto take = [&](double distance, double fraction) {
+    if (distance < nearest.distance_mm) {
+      nearest = {distance, fraction};
     }
-    if (fraction >= 1.0 || length == 0.0) {
-      return 2.0;
+  };
+  take(DistanceOf(obstacle, from + way), 1.0);
+  const double length2 = way.squaredNorm();
+  for (std::size_t i = 0; length2 > 0.0 && i < obstacle.count; ++i) {
+    const double t = std::clamp((obstacle.At(i) - from).dot(way) / length2, 0.0, 1.0);
+    take((from + t * way - obstacle.At(i)).norm(), t);
+  }
+  return nearest;
+}
+
+// Goes along the path until the first contact, which replaces a later one, or keeps where it comes nearest.
+void SweepPast(const Obstacle& obstacle, std::size_t body, std::span<const Vector2d> path, double reach_mm,
+               SweptAnswer& answer) {
+  for (std::size_t i = 0; i < path.size(); ++i) {
+    if (answer.collides && i > answer.stretch) {
+      return;
     }
-    // Half the distance beyond the margin, so that the smallest clearance is met to within a third; at least a micrometre,
-    // which ends the search beside a body that is passed closely.
-    free = fraction;
-    fraction = std::min(1.0, fraction + std::max(0.5 * (distance - margin_mm), kLeastStepMm) / length);
+    const Vector2d way = (i + 1 < path.size() ? path[i + 1] : path[i]) - path[i];
+    const bool at_once = DistanceOf(obstacle, path[i]) <= reach_mm;
+    const double contact = at_once ? 0.0 : FirstWithin(obstacle, path[i], way, reach_mm);
+    if (contact <= 1.0) {
+      if (!answer.collides || i < answer.stretch || contact < answer.fraction) {
+        answer = {true, i, contact, body, path[i] + contact * way, 0.0};
+      }
+      return;
+    }
+    const Nearest nearest = NearestOn(obstacle, path[i], way);
+    if (!answer.collides && nearest.distance_mm < answer.clearance_mm) {
+      answer = {false, i, nearest.fraction, body, path[i] + nearest.fraction * way, nearest.distance_mm};
+    }
   }
-  for (int i = 0; i < 30 && (fraction - free) * length > kTouchMm; ++i) {
-    const double middle = 0.5 * (free + fraction);
-    (at(middle) <= margin_mm + kTouchMm ? fraction : free) = middle;
-  }
-  return fraction;
 }
 
 }  // namespace
@@ -122,23 +181,9 @@ SweptAnswer SweepSheet(Corners sheet, std::span<const Vector2d> path, std::span<
   Expects(IsConvex(sheet), "SweepSheet: a convex, counter-clockwise sheet");
   SweptAnswer answer;
   answer.clearance_mm = std::numeric_limits<double>::max();
-  for (std::size_t i = 0; i < path.size(); ++i) {
-    const Vector2d& from = path[i];
-    const Vector2d& to = i + 1 < path.size() ? path[i + 1] : from;
-    double earliest = 1.5;
-    for (std::size_t b = 0; b < bodies.size(); ++b) {
-      double nearest = answer.clearance_mm;
-      const double contact = FirstContact(sheet, from, to, bodies[b], margin_mm, nearest);
-      if (contact < earliest) {
-        earliest = contact;
-        answer = {true, i, contact, b, from + contact * (to - from), 0.0};
-      } else if (!answer.collides && nearest < answer.clearance_mm) {
-        answer = {false, i, 0.0, b, from, nearest};
-      }
-    }
-    if (answer.collides) {
-      return answer;
-    }
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    Expects(IsConvex(bodies[b]), "SweepSheet: convex, counter-clockwise bodies");
+    SweepPast(ObstacleOf(sheet, bodies[b]), b, path, margin_mm + kTouchMm, answer);
   }
   return answer;
 }

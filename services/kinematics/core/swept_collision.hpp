@@ -1,11 +1,11 @@
 // Says whether a sheet that the mechanism carries along a path runs into a fixed body: the head's stand, a module's base.
 //
-// Model: E stays parallel to D (foundation/geometry/frames.md), so the sheet is carried without turning; over one straight
-// stretch it sweeps the convex hull of itself at both ends. The first contact is found by conservative advancement: the
-// distance of two convex polygons shrinks no faster than the sheet moves.
+// Model: E stays parallel to D (foundation/geometry/frames.md), so the sheet is carried without turning, and it overlaps a
+// body exactly where the tool lies in the body's Minkowski sum with the mirrored sheet. Contact and clearance of a stretch
+// are those of a straight line and that convex polygon, in closed form.
 // Frames: the sheet's corners in E, bodies and path in D. Units: mm.
 // Shapes: polygons convex, counter-clockwise, 3 to 64 corners. Threads: pure.
-// Cost: about 1 us a stretch and body; no allocation.
+// Cost: about 0.2 us a stretch and body of four corners each; no allocation.
 #pragma once
 
 #include <Eigen/Core>
@@ -28,14 +28,12 @@ std::array<Eigen::Vector2d, 4> BodyCorners(double x_min_mm, double y_min_mm, dou
 // Counter-clockwise, convex, with an area.
 bool IsConvex(Corners polygon);
 
-// Distance of two convex polygons, 0 if they touch or overlap; the first is moved by `shift_mm`.
-double Distance(Corners moving, const Eigen::Vector2d& shift_mm, Corners fixed);
-
 struct SweptAnswer {
   bool collides = false;
-  std::size_t stretch = 0;  // of the first contact: from path point `stretch` to the next
-  double fraction = 0.0;    // of that stretch
-  std::size_t body = 0;     // the body met first, or the one that comes nearest
+  std::size_t stretch =
+      0;                  // of the first contact, or the nearest place: from path point `stretch` to the next
+  double fraction = 0.0;  // of that stretch
+  std::size_t body = 0;   // the body met first, or the one that comes nearest
   Eigen::Vector2d p_DE_mm = Eigen::Vector2d::Zero();  // tool there
   double clearance_mm = 0.0;                          // smallest distance on the way; 0 if it collides
 };
