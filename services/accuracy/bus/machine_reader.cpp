@@ -2,7 +2,6 @@
 
 #include <optional>
 
-#include "foundation/contract/trouble.hpp"
 #include "lambdajet/calibration/v1/machine_description.h"
 #include "lambdajet/calibration/v1/machine_description.schema.hpp"
 #include "lambdajet/calibration/v1/machine_descriptionPubSubTypes.h"
@@ -17,31 +16,8 @@ namespace {
 namespace wire = lambdajet::idl::calibration::v1;
 
 absl::StatusOr<MachineDescription> FromWire(const wire::MachineDescription& sample) {
-  absl::StatusOr<MachineDescription> machine =
-      ParseMachine(sample.as_designed_yaml().to_string(), "calibration/machine_description");
-  if (!machine.ok()) {
-    return machine;
-  }
-  machine->version = sample.version();
-  machine->hash = sample.hash().to_string();
-  for (std::size_t i = 0; i < kParameterCount; ++i) {
-    machine->parameters[static_cast<Eigen::Index>(i)] = sample.parameters()[i];
-    for (std::size_t j = 0; j < kParameterCount; ++j) {
-      machine->covariance(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) =
-          sample.covariance()[kParameterCount * i + j];
-    }
-  }
-  const auto faults = Validate(*machine);
-  if (!faults.empty()) {
-    return Trouble(absl::StatusCode::kInvalidArgument, "BAD_MACHINE_DESCRIPTION",
-                   faults.front().key + " is " + std::to_string(faults.front().value) + "; should be " +
-                       faults.front().should);
-  }
-  if (MachineHash(*machine) != machine->hash) {
-    return Trouble(absl::StatusCode::kDataLoss, "DESCRIPTION_HASH_MISMATCH",
-                   "the description hashes to " + MachineHash(*machine) + ", its writer says " + machine->hash);
-  }
-  return machine;
+  return DescribedMachine({sample.as_designed_yaml().to_string(), sample.parameters(), sample.covariance(),
+                           sample.version(), sample.hash().to_string()});
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <map>
 #include <set>
 
+#include "foundation/contract/expects.hpp"
 #include "foundation/contract/trouble.hpp"
 #include "platform/machine_file/yaml_map_reader.hpp"
 #include "platform/process/atomic_file.hpp"
@@ -296,8 +297,9 @@ absl::Status WriteMachineFile(const std::string& path, const MachineDescription&
   return WriteFileAtomically(path, MachineText(machine));
 }
 
-std::string MachineHash(const MachineDescription& machine) {
-  const std::string text = ContentText(machine);
+std::string MachineHash(const MachineDescription& machine) { return ContentHash(ContentText(machine)); }
+
+std::string ContentHash(const std::string& text) {
   unsigned char digest[SHA256_DIGEST_LENGTH];
   SHA256(reinterpret_cast<const unsigned char*>(text.data()), text.size(), digest);
   std::string hash;
@@ -307,6 +309,32 @@ std::string MachineHash(const MachineDescription& machine) {
     hash += kHex[digest[i] & 15];
   }
   return hash;
+}
+
+absl::StatusOr<MachineDescription> DescribedMachine(const DescribedParts& parts) {
+  auto machine = ParseMachine(parts.as_designed_yaml, "calibration/machine_description");
+  if (!machine.ok()) {
+    return machine.status();
+  }
+  Expects(parts.parameters.size() == kParameterCount &&
+              parts.covariance.size() == kParameterCount * kParameterCount,
+          "DescribedMachine: the whole parameter vector and its covariance");
+  constexpr auto kCount = static_cast<Eigen::Index>(kParameterCount);
+  using Rows = Eigen::Matrix<double, kCount, kCount, Eigen::RowMajor>;
+  machine->parameters = Eigen::Map<const Eigen::Matrix<double, kCount, 1>>(parts.parameters.data());
+  machine->covariance = Eigen::Map<const Rows>(parts.covariance.data());
+  machine->version = parts.version;
+  if (const auto faults = Validate(*machine); !faults.empty()) {
+    return Trouble(absl::StatusCode::kInvalidArgument, "BAD_MACHINE_DESCRIPTION",
+                   faults.front().key + " is " + std::to_string(faults.front().value) + "; should be " +
+                       faults.front().should);
+  }
+  machine->hash = MachineHash(*machine);
+  if (machine->hash != parts.hash) {
+    return Trouble(absl::StatusCode::kInvalidArgument, "DESCRIPTION_HASH_MISMATCH",
+                   "the description says hash " + parts.hash + " but is " + machine->hash);
+  }
+  return machine;
 }
 
 }  // namespace lambdajet

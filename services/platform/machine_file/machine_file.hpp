@@ -8,9 +8,11 @@
 // same hash calculate the same.
 // Units: in the keys. Threads: any.
 // Errors: INVALID_ARGUMENT BAD_MACHINE_FILE with up to 20 violations, each with key, value, unit and line; those of
-// ReadWholeFile.
+// ReadWholeFile; of DescribedMachine BAD_MACHINE_DESCRIPTION and DESCRIPTION_HASH_MISMATCH.
 #pragma once
 
+#include <cstdint>
+#include <span>
 #include <string>
 
 #include "absl/status/statusor.h"
@@ -28,5 +30,19 @@ absl::Status WriteMachineFile(const std::string& path, const MachineDescription&
 
 // What `machine.hash` must be; set it after every change.
 std::string MachineHash(const MachineDescription& machine);
+
+// The first 12 hex digits of SHA-256.
+std::string ContentHash(const std::string& text);
+
+// A machine as calibration describes it on the bus: the as-designed file as text, with parameters and covariance (row by row)
+// in the place of its own, and the hash that its writer made of both.
+struct DescribedParts {
+  std::string as_designed_yaml;
+  std::span<const double> parameters;
+  std::span<const double> covariance;
+  std::uint32_t version = 0;
+  std::string hash;
+};
+absl::StatusOr<MachineDescription> DescribedMachine(const DescribedParts& parts);
 
 }  // namespace lambdajet
