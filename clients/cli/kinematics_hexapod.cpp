@@ -13,6 +13,7 @@
 #include "kinematics/core/hexapod_singularity.hpp"
 #include "kinematics/core/hexapod_workspace.hpp"
 #include "kinematics/core/service_area.hpp"
+#include "kinematics/core/service_rectangle.hpp"
 #include "platform/machine_file/hexapod_file.hpp"
 
 namespace lambdajet::cli {
@@ -116,23 +117,8 @@ struct ServiceAreaOptions {
   std::string out = "-";
 };
 
-struct ServiceKey {
-  const char* name;
-  double ServiceAreaMachine::*member;
-};
-constexpr std::array<ServiceKey, 9> kServiceKeys = {
-    {{"base_joint_spacing_mm", &ServiceAreaMachine::base_joint_spacing_mm},
-     {"platform_joint_spacing_mm", &ServiceAreaMachine::platform_joint_spacing_mm},
-     {"strut_min_mm", &ServiceAreaMachine::strut_min_mm},
-     {"strut_max_mm", &ServiceAreaMachine::strut_max_mm},
-     {"tool_length_mm", &ServiceAreaMachine::tool_length_mm},
-     {"tilt_rad", &ServiceAreaMachine::tilt_rad},
-     {"height_mm", &ServiceAreaMachine::height_mm},
-     {"frame_top_ratio", &ServiceAreaMachine::frame_top_ratio},
-     {"frame_bottom_ratio", &ServiceAreaMachine::frame_bottom_ratio}}};
-
-const ServiceKey* KeyNamed(const std::string& name) {
-  for (const ServiceKey& key : kServiceKeys) {
+const ServiceNumber* KeyNamed(const std::string& name) {
+  for (const ServiceNumber& key : kServiceNumbers) {
     if (name == key.name) {
       return &key;
     }
@@ -155,7 +141,15 @@ std::vector<std::string> ServiceColumns(const std::string& swept) {
           "paper_region_mm2",
           "intersection_mm2",
           "union_mm2",
-          "single_tilt_mm2"};
+          "single_tilt_mm2",
+          "rectangle_x_min_mm",
+          "rectangle_y_min_mm",
+          "rectangle_x_max_mm",
+          "rectangle_y_max_mm",
+          "left_bound",
+          "right_bound",
+          "base_bound",
+          "table_bound"};
 }
 
 void AddServiceRow(const ServiceAreaMachine& machine, double value, CsvTable& table) {
@@ -170,6 +164,14 @@ void AddServiceRow(const ServiceAreaMachine& machine, double value, CsvTable& ta
                                      ServiceRegion::kUnion, ServiceRegion::kSingleTilt}) {
     Append(cells, ExactArea(machine, region));
   }
+  const ServiceRectangle found = LargestServiceRectangle(machine);
+  const Rectangle& r = found.rectangle;
+  for (const double number : {r.x_min_mm, r.y_min_mm, r.x_max_mm, r.y_max_mm}) {
+    Append(cells, number);
+  }
+  for (const ServiceBound& bound : found.binding) {
+    cells.emplace_back(ServiceLimitName(bound.limit));
+  }
   table.AddRow(std::move(cells));
 }
 
@@ -179,7 +181,7 @@ absl::Status TabulateServiceArea(const ServiceAreaOptions& options, Output& outp
     return machine.status();
   }
   CsvTable table(ServiceColumns(options.sweep));
-  const ServiceKey* swept = options.sweep.empty() ? nullptr : KeyNamed(options.sweep);
+  const ServiceNumber* swept = options.sweep.empty() ? nullptr : KeyNamed(options.sweep);
   if (!options.sweep.empty() && (swept == nullptr || options.points < 2 || options.points > 1000)) {
     return BadServiceArea("sweep '" + options.sweep +
                           "': a parameter's name with 2 to 1000 points would be right");
@@ -207,7 +209,7 @@ absl::StatusOr<ServiceAreaMachine> ServiceMachineOf(const std::vector<std::strin
   machine.tilt_rad = 15.0 * M_PI / 180.0;  // the paper's, as the defaults of the others
   for (const std::string& setting : settings) {
     const std::size_t equals = setting.find('=');
-    const ServiceKey* key = equals == std::string::npos ? nullptr : KeyNamed(setting.substr(0, equals));
+    const ServiceNumber* key = equals == std::string::npos ? nullptr : KeyNamed(setting.substr(0, equals));
     char* end = nullptr;
     const std::string text = equals == std::string::npos ? "" : setting.substr(equals + 1);
     const double value = std::strtod(text.c_str(), &end);

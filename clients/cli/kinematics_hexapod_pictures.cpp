@@ -9,6 +9,7 @@
 #include "clients/cli/picture.hpp"
 #include "foundation/contract/trouble.hpp"
 #include "kinematics/core/hexapod_singularity.hpp"
+#include "kinematics/core/service_rectangle.hpp"
 #include "platform/machine_file/hexapod_file.hpp"
 
 namespace lambdajet::cli {
@@ -110,21 +111,52 @@ void DrawClosedForm(PlotFrame& frame, const ServiceAreaMachine& m, const PaperSe
   if (p.x_D_mm < p.x_K_mm) {
     FillPart(frame, origin, p.x_D_mm, p.x_K_mm, outer_1, table, kRed, "S4");
   }
-  const auto mark = [&](double x, double y, const char* name, double dy_px = -5.0) {
+  const auto mark = [&](double x, double y, const char* name, double dx_px = 6.0, double dy_px = -5.0) {
     frame.Dot(origin.x_mm + x, origin.y_mm + y, 3.2, kInk);
-    frame.Text(origin.x_mm + x, origin.y_mm + y, name, kInk, 6.0, dy_px);
+    frame.Text(origin.x_mm + x, origin.y_mm + y, name, kInk, dx_px, dy_px);
   };
   mark(p.x_A_mm, wall(p.x_A_mm), "A");
   mark(p.x_B_mm, wall(p.x_B_mm), "B");
-  mark(p.x_E_mm, outer_2(p.x_E_mm), "E");
+  mark(p.x_E_mm, outer_2(p.x_E_mm), "E", -17.0, 12.0);
   mark(p.x_K_mm, inner(p.x_K_mm), "K");
   mark(p.x_M_mm, p.y_M_mm, "M");
   if (p.x_D_mm < p.x_K_mm) {
-    mark(p.x_D_mm, p.y_D_mm, "D", 16.0);
+    mark(p.x_D_mm, p.y_D_mm, "D", 6.0, 16.0);
   }
 }
 
 std::string SquareMetres(double mm2) { return fmt::format("{:.4f} m\u00b2", mm2 * 1e-6); }
+
+void DrawRectangle(PlotFrame& frame, const Rectangle& r) {
+  frame.Line({{r.x_min_mm, r.y_min_mm},
+              {r.x_max_mm, r.y_min_mm},
+              {r.x_max_mm, r.y_max_mm},
+              {r.x_min_mm, r.y_max_mm},
+              {r.x_min_mm, r.y_min_mm}},
+             kInk, 1.5);
+}
+
+std::string BoundOf(const char* side, const ServiceBound& bound) {
+  return fmt::format("{} {}", side, ServiceLimitSentence(bound.limit)) +
+         (bound.joint > 0 ? fmt::format(" ({}, {}phi)", bound.joint, bound.tilt_sign > 0 ? "+" : "-") : "");
+}
+
+// The rectangle in the region that both tilts serve, and under the picture what binds its sides.
+void DrawServiceRectangle(Picture& picture, PlotFrame& frame, const ServiceAreaMachine& m) {
+  const ServiceRectangle found = LargestServiceRectangle(m);
+  const Rectangle& r = found.rectangle;
+  if (!(r.area_mm2() > 0.0)) {
+    return;
+  }
+  DrawRectangle(frame, r);
+  picture.Text(680, 626,
+               fmt::format("largest rectangle {:.0f} x {:.0f} mm: {}; {};", r.x_max_mm - r.x_min_mm,
+                           r.y_max_mm - r.y_min_mm, BoundOf("left", found.binding[0]),
+                           BoundOf("right", found.binding[1])),
+               12, kGrey);
+  picture.Text(680, 642, BoundOf("above", found.binding[2]) + "; " + BoundOf("below", found.binding[3]), 12,
+               kGrey);
+}
 
 absl::Status DrawServiceArea(const std::vector<std::string>& settings, const std::string& path) {
   const auto machine = ServiceMachineOf(settings);
@@ -133,7 +165,7 @@ absl::Status DrawServiceArea(const std::vector<std::string>& settings, const std
   }
   const ServiceAreaMachine& m = *machine;
   const PaperServiceArea paper = PaperClosedForm(m);
-  Picture picture(1240, 620);
+  Picture picture(1240, 656);
   PlotFrame left =
       ServiceFrame(picture, {70, 60, 520, 480}, m,
                    "The paper's parts (Fig. 2), left half; closed form " +
@@ -157,6 +189,7 @@ absl::Status DrawServiceArea(const std::vector<std::string>& settings, const std
   FillRegion(right, m, ServiceRegion::kUnion, Colour{0.80, 0.87, 0.95});
   FillRegion(right, m, ServiceRegion::kIntersection, Colour{0.42, 0.67, 0.48});
   DrawMachineFrame(right, m);
+  DrawServiceRectangle(picture, right, m);
   const auto area = [&](ServiceRegion region) { return SquareMetres(ExactArea(m, region)); };
   picture.Text(680, 594,
                "dark: served at +phi and at -phi, " + area(ServiceRegion::kIntersection) +
@@ -306,9 +339,10 @@ void DrawSlice(Picture& picture, PlotFrame::Place place, const Hexapod& hexapod,
   for (const HexapodSpan& span : slice.spans) {
     reach = std::max({reach, std::abs(span.from_x_mm), std::abs(span.to_x_mm), std::abs(span.y_mm)});
   }
-  PlotFrame frame(picture, place, {-1.1 * reach, 1.1 * reach, "x, mm"}, {-1.1 * reach, 1.1 * reach, "y, mm"},
-                  fmt::format("workspace of the tool at z {:.0f} mm: {}", z_mm, SquareMetres(slice.area_mm2)),
-                  true);
+  PlotFrame frame(
+      picture, place, {-1.1 * reach, 1.1 * reach, "x, mm"}, {-1.1 * reach, 1.1 * reach, "y, mm"},
+      fmt::format("workspace at z {:.0f} mm: {}; its largest rectangle", z_mm, SquareMetres(slice.area_mm2)),
+      true);
   for (const HexapodSpan& span : slice.spans) {
     const double half = 0.55 * request.step_mm;
     frame.Area({{span.from_x_mm, span.y_mm - half},
@@ -316,6 +350,16 @@ void DrawSlice(Picture& picture, PlotFrame::Place place, const Hexapod& hexapod,
                 {span.to_x_mm, span.y_mm + half},
                 {span.from_x_mm, span.y_mm + half}},
                Colour{0.86, 0.93, 0.87});
+  }
+  const HexapodRectangle found = LargestRectangle(hexapod, request, slice);
+  if (found.rectangle.area_mm2() > 0.0) {
+    DrawRectangle(frame, found.rectangle);
+    for (std::size_t side = 0; side < 4; ++side) {
+      const Rectangle& r = found.rectangle;
+      const double x = side == 0 ? r.x_min_mm : side == 1 ? r.x_max_mm : 0.5 * (r.x_min_mm + r.x_max_mm);
+      const double y = side == 2 ? r.y_min_mm : side == 3 ? r.y_max_mm : 0.5 * (r.y_min_mm + r.y_max_mm);
+      frame.Dot(x, y, 5.0, BoundColour(found.binding[side].bound));
+    }
   }
   for (const HexapodSpan& span : slice.spans) {
     frame.Dot(span.from_x_mm, span.y_mm, 2.4, BoundColour(span.from.bound));

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <memory>
 #include <optional>
@@ -183,11 +184,12 @@ absl::Status DrawWorkspace(const PictureOptions& options, Output& output) {
   extent.Take(extent.low - Vector2d(0.0, margin));
   extent.Take(extent.high + Vector2d(0.0, margin));
   const Rectangle& r = workspace.rectangle;
-  Picture picture(1010, 670);
+  Picture picture(1010, 708);
   PlotFrame frame = FrameFor(
       picture, extent,
-      fmt::format("workspace {} m2; largest rectangle {} x {} mm", Fixed(1e-6 * workspace.area_mm2, 4),
+      fmt::format("workspace {} m\u00b2; largest rectangle {} x {} mm", Fixed(1e-6 * workspace.area_mm2, 4),
                   Fixed(r.x_max_mm - r.x_min_mm, 1), Fixed(r.y_max_mm - r.y_min_mm, 1)));
+  DrawRail(frame, mechanism->geometry.rail_1, {extent.low.x(), extent.high.x()});
   DrawSingularZones(frame, *mechanism, extent);
   for (const Outline& outline : workspace.outlines) {
     Points line = PointsOf(outline);
@@ -201,7 +203,11 @@ absl::Status DrawWorkspace(const PictureOptions& options, Output& output) {
               {r.x_min_mm, r.y_max_mm},
               {r.x_min_mm, r.y_min_mm}},
              kGreen, 2.0);
-  DrawRail(frame, mechanism->geometry.rail_1, {extent.low.x(), extent.high.x()});
+  constexpr std::array<const char*, 4> kSides = {"left", "right", "bottom", "top"};
+  for (std::size_t i = 0; i < kSides.size(); ++i) {
+    picture.Text(75.0 + 470.0 * static_cast<double>(i % 2), 676.0 + 18.0 * static_cast<double>(i / 2),
+                 fmt::format("{}: {}", kSides[i], PoseLimitSentence(workspace.binding[i])), 12, kGrey);
+  }
   frame.Legend(
       {{"usable", kBlue},
        {fmt::format("within {} mm of a singular line", Fixed(mechanism->singular_margin_mm, 1)), kRed},

@@ -220,7 +220,7 @@ int Run() {
   const auto unary = UnaryRequest();
   v1::SolveInverseBatchResponse batch_answer;
   v1::SolveInverseResponse unary_answer;
-  if (!answers.SolveBatch(batch, batch_answer).ok() || !answers.SolveInverse(unary, unary_answer).ok()) {
+  if (!answers.AnswerBatch(batch, batch_answer).ok() || !answers.SolveInverse(unary, unary_answer).ok()) {
     return 1;
   }
   Echo echo(BytesOf(unary_answer), BytesOf(batch_answer));

@@ -1,3 +1,3 @@
 lambdajet_check(bus_kinematics LABELS bus TIMEOUT 120 SOURCES kinematics_program_test.cpp
-  DEPS platform_bus platform_machine_file lambdajet_idl test_support)
+  DEPS kinematics_spatial platform_bus platform_machine_file lambdajet_idl test_support)
 add_dependencies(bus_kinematics kinematics_program)

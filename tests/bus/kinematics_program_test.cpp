@@ -4,15 +4,19 @@
 
 #include <cmath>
 
+#include "kinematics/core/hexapod_jacobian.hpp"
 #include "lambdajet/calibration/v1/machine_description.schema.hpp"
 #include "lambdajet/calibration/v1/machine_descriptionPubSubTypes.h"
 #include "lambdajet/drive/v1/state.schema.hpp"
 #include "lambdajet/drive/v1/statePubSubTypes.h"
 #include "lambdajet/kinematics/v1/pose.schema.hpp"
 #include "lambdajet/kinematics/v1/posePubSubTypes.h"
+#include "lambdajet/kinematics/v1/spatial_pose.schema.hpp"
+#include "lambdajet/kinematics/v1/spatial_posePubSubTypes.h"
 #include "platform/bus/reader.hpp"
 #include "platform/bus/sample_slots.hpp"
 #include "platform/bus/writer.hpp"
+#include "platform/machine_file/hexapod_file.hpp"
 #include "platform/machine_file/machine_file.hpp"
 #include "tests/support/child_process.hpp"
 #include "tests/support/eventually.hpp"
@@ -26,6 +30,9 @@ using idl::calibration::v1::MachineDescriptionPubSubType;
 using idl::drive::v1::StatePubSubType;
 using idl::kinematics::v1::Pose;
 using idl::kinematics::v1::PosePubSubType;
+using idl::kinematics::v1::SpatialPose;
+using idl::kinematics::v1::SpatialPosePubSubType;
+using idl::kinematics::v1::StrutReadingsPubSubType;
 using test::Eventually;
 
 idl::calibration::v1::MachineDescription Description(MachineDescription machine, std::uint32_t version,
@@ -63,11 +70,14 @@ class KinematicsProgram : public testing::Test {
     machine_ = *ReadMachineFile(test::SourceDir() + "/deploy/config/machine.yaml");
   }
 
-  test::ChildOptions Program() {
+  test::ChildOptions Program(const std::string& hexapod_file = "") {
     test::ChildOptions options;
     options.program = "kinematics";
     options.arguments = {"--config=" + test::SourceDir() + "/deploy/config/loopback.yaml",
                          "--bus.domain=" + std::to_string(domain_.number())};
+    if (!hexapod_file.empty()) {
+      options.arguments.push_back("--hexapod_file=" + hexapod_file);
+    }
     options.announce_file = folder_.path() + "/announce.json";
     return options;
   }
@@ -192,6 +202,69 @@ TEST_F(KinematicsProgram, DropsSamplesThatAreOldOrOfAnEndedSession) {
   Send(3, 3, 8);
   ASSERT_TRUE(Eventually([&] { return newest == 8; }));
   EXPECT_EQ(count.load(), seen + 1);
+}
+
+TEST_F(KinematicsProgram, AnswersForItsHexapodWithoutAMachineDescription) {
+  const std::string file = test::SourceDir() + "/deploy/config/hexapod.yaml";
+  const auto machine = ReadHexapodFile(file);
+  ASSERT_TRUE(machine.ok()) << machine.status();
+  const kinematics::Hexapod hexapod(machine->geometry);
+  auto struts = Writer<StrutReadingsPubSubType>::Open(
+      *bus_, {idl::kinematics::v1::STRUT_READINGS_TOPIC, idl::schema::k_lambdajet_kinematics_v1_spatial_pose,
+              "state"});
+  LatestSample<SpatialPose> poses;
+  auto reader = Reader<SpatialPosePubSubType>::Open(
+      *bus_,
+      {idl::kinematics::v1::SPATIAL_POSE_TOPIC, idl::schema::k_lambdajet_kinematics_v1_spatial_pose, "state"},
+      [&](const SpatialPose& sample, const Arrival& arrival) { poses.Put(sample, arrival); });
+  ASSERT_TRUE(struts.ok() && reader.ok());
+  test::ChildProcess program(Program(file));
+  ASSERT_TRUE(program.WaitUntilReady().has_value()) << program.err();
+
+  const lambdajet::Pose X_MT = kinematics::PlatformPose{40, -30, 960, 0.1, 0.15, -0.1}.X_MP();
+  const lambdajet::Pose X_MP = kinematics::PlatformFromTool(hexapod, X_MT);
+  const Twist twist{{30, -20, 10}, {0.1, 0.2, -0.3}};
+  const auto actuators = kinematics::SolveInverse(hexapod, X_MP);
+  const auto motion = kinematics::ActuatorMotionOfTool(hexapod, X_MP, twist, {});
+  ASSERT_EQ(actuators.reason, kinematics::Reason::kSolved);
+  idl::kinematics::v1::StrutReadings readings;
+  readings.header().session(9);
+  for (std::size_t j = 0; j < 6; ++j) {
+    readings.actuator_position_mm()[j] = actuators.actuators_mm[static_cast<Eigen::Index>(j)];
+    readings.actuator_velocity_mm_per_s()[j] = motion.motion.velocity_mm_per_s[static_cast<Eigen::Index>(j)];
+  }
+  const auto Send = [&] {
+    readings.header().sequence_number(readings.header().sequence_number() + 1);
+    struts->Write(readings);
+  };
+  ASSERT_TRUE(Eventually([&] { return Send(), poses.received() > 0; })) << program.err();
+  const SpatialPose pose = poses.Latest()->first;
+  EXPECT_EQ(pose.reason(), 1u);
+  EXPECT_EQ(std::string(pose.model_hash().c_str()), HexapodHash(*machine));
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto at = static_cast<Eigen::Index>(i);
+    EXPECT_NEAR(pose.p_MT_mm()[i], X_MT.p_mm[at], 1e-8);
+    EXPECT_NEAR(pose.v_MT_mm_per_s()[i], twist.v_mm_per_s[at], 1e-8);
+    EXPECT_NEAR(pose.w_MT_rad_per_s()[i], twist.w_rad_per_s[at], 1e-10);
+  }
+  EXPECT_NEAR(pose.krylov_rad()[1], 0.15, 1e-11);
+  EXPECT_GT(pose.singular_margin_ratio(), machine->geometry.limits.singular_margin);
+
+  // Lengths that no pose has, and numbers that are none: an answer with a reason, and the next pose is found again.
+  readings.actuator_position_mm()[3] = 5000.0;
+  ASSERT_TRUE(Eventually([&] { return Send(), poses.Latest()->first.reason() == 8; }));
+  EXPECT_EQ(poses.Latest()->first.p_MT_mm()[2], 0.0);
+  readings.actuator_position_mm()[3] = std::nan("");
+  ASSERT_TRUE(Eventually([&] { return Send(), poses.Latest()->first.reason() == 5; }));
+  EXPECT_EQ(poses.Latest()->first.actuator_position_mm()[3], 0.0);
+  readings.actuator_position_mm()[3] = actuators.actuators_mm[3];
+  ASSERT_TRUE(Eventually([&] { return Send(), poses.Latest()->first.reason() == 1; }));
+}
+
+TEST_F(KinematicsProgram, RefusesAHexapodFileThatIsNone) {
+  test::ChildProcess program(Program(test::SourceDir() + "/deploy/config/machine.yaml"));
+  EXPECT_EQ(program.WaitForExit(), 78);
+  EXPECT_NE(program.err().find("BAD_HEXAPOD_FILE"), std::string::npos) << program.err();
 }
 
 }  // namespace

@@ -161,10 +161,10 @@ HexapodOutcome AskHexapod(int question, const std::string& bytes) {
           bytes, [&](const auto& asked, auto& answer) { return answers.SolveForward(asked, answer); });
     case 2:
       return Try<v1::SolveInverseBatchRequest, v1::SolveInverseBatchResponse>(
-          bytes, [&](const auto& asked, auto& answer) { return answers.SolveBatch(asked, answer); });
+          bytes, [&](const auto& asked, auto& answer) { return answers.AnswerBatch(asked, answer); });
     case 3:
       return Try<v1::SolveForwardBatchRequest, v1::SolveForwardBatchResponse>(
-          bytes, [&](const auto& asked, auto& answer) { return answers.SolveBatch(asked, answer); });
+          bytes, [&](const auto& asked, auto& answer) { return answers.AnswerBatch(asked, answer); });
     case 4:
       return Try<v1::ComputeJacobianRequest, v1::ComputeJacobianResponse>(
           bytes, [&](const auto& asked, auto& answer) { return answers.ComputeJacobian(asked, answer); });

@@ -8,6 +8,7 @@
 #include "kinematics/rpc/wire_workspace.hpp"
 #include "tests/fuzz/all_finite.hpp"
 #include "tests/fuzz/fuzz_target.hpp"
+#include "tests/papers/kinematics_hexapod_cases.hpp"
 
 namespace lambdajet::kinematics {
 namespace {
@@ -30,9 +31,16 @@ void Try(const std::string& bytes, Ask ask) {
   }
 }
 
+template <class Request, class Response>
+void TryBatch(const KinematicsAnswers& answers, const std::string& bytes) {
+  Try<Request, Response>(
+      bytes, [&](const auto& request, auto& response) { return answers.AnswerBatch(request, response); });
+}
+
 const MachineSlot& Slot() {
   static const MachineSlot& slot = *[] {
-    auto* made = new MachineSlot;
+    auto* made = new MachineSlot(std::make_shared<const OwnHexapod>(
+        OwnHexapod{"fuzz-hexapod", "", Hexapod(worked::NonIdealGeometry())}));
     MachineDescription machine;
     machine.machine_id = "fuzz";
     machine.parameters.head<kMechanismParameterCount>() = IdealLambda(1200, 600, 700);
@@ -47,7 +55,7 @@ const MachineSlot& Slot() {
 void Ask(int question, const std::string& bytes) {
   const KinematicsAnswers answers(Slot());
   const auto give_up = [] { return true; };
-  switch (question % 9) {
+  switch (question % 14) {
     case 0:
       return Try<v1::SolveInverseRequest, v1::SolveInverseResponse>(
           bytes,
@@ -57,11 +65,9 @@ void Ask(int question, const std::string& bytes) {
           bytes,
           [&](const auto& request, auto& response) { return answers.SolveForward(request, response); });
     case 2:
-      return Try<v1::SolveInverseBatchRequest, v1::SolveInverseBatchResponse>(
-          bytes, [&](const auto& request, auto& response) { return answers.SolveBatch(request, response); });
+      return TryBatch<v1::SolveInverseBatchRequest, v1::SolveInverseBatchResponse>(answers, bytes);
     case 3:
-      return Try<v1::SolveForwardBatchRequest, v1::SolveForwardBatchResponse>(
-          bytes, [&](const auto& request, auto& response) { return answers.SolveBatch(request, response); });
+      return TryBatch<v1::SolveForwardBatchRequest, v1::SolveForwardBatchResponse>(answers, bytes);
     case 4:
       return Try<v1::ComputeJacobianRequest, v1::ComputeJacobianResponse>(
           bytes,
@@ -79,11 +85,21 @@ void Ask(int question, const std::string& bytes) {
           bytes, [&](const auto& request, auto& response) {
             return ComputeWorkspace(Slot(), request, give_up, response);
           });
-    default:
+    case 8:
       return Try<v1::OptimiseGeometryRequest, v1::OptimiseGeometryResponse>(
           bytes, [&](const auto& request, auto& response) {
             return OptimiseGeometry(Slot(), request, give_up, response);
           });
+    case 9:
+      return TryBatch<v1::ComputeJacobianBatchRequest, v1::ComputeJacobianBatchResponse>(answers, bytes);
+    case 10:
+      return TryBatch<v1::ReportSingularityBatchRequest, v1::ReportSingularityBatchResponse>(answers, bytes);
+    case 11:
+      return TryBatch<v1::CarryPointBatchRequest, v1::CarryPointBatchResponse>(answers, bytes);
+    case 12:
+      return TryBatch<v1::SumErrorsRequest, v1::SumErrorsResponse>(answers, bytes);
+    default:
+      return TryBatch<v1::SweepSheetRequest, v1::SweepSheetResponse>(answers, bytes);
   }
 }
 

@@ -49,7 +49,7 @@ TEST(PaperChain, ToolToPart) {
   const std::array<ChainFactor, 3> tool = {{{Motion::kX, 800}, {Motion::kY, 300}, {Motion::kGamma, 0.01}}};
   const std::array<ChainFactor, 4> part = {
       {{Motion::kX, 1500}, {Motion::kY, -20}, {Motion::kGamma, -0.004}, {Motion::kZ, -4}}};
-  ExpectVector(ToolPointInPart(MultiplyChain(tool).pose(), MultiplyChain(part).pose(), {100, 200, 0}),
+  ExpectVector(CarryPoint(ToolInPart(MultiplyChain(tool), MultiplyChain(part)), {{100, 200, 0}, {}, {}}).r_mm,
                -604.0841049683, 518.5778020573, 4);
 }
 
@@ -103,6 +103,23 @@ TEST(Chain, DerivativesMatchDifferencesOverTime) {
                             (12 * h);
   EXPECT_LT((now.v_mm_per_s - v).norm(), 1e-8 * v.norm());
   EXPECT_LT((now.a_mm_per_s2 - a).norm(), 1e-8 * a.norm());
+}
+
+TEST(Chain, SeenFromAMovingPartMatchesDifferencesOverTime) {
+  const auto at = [](double t) {
+    const ChainMotion part = MultiplyChain(std::array<ChainFactor, 3>{{{Motion::kGamma, 0.4 * t, 0.4, 0.0},
+                                                                       {Motion::kY, 20 * t * t, 40 * t, 40},
+                                                                       {Motion::kBeta, 0.1 - t, -1, 0}}});
+    return CarryPoint(ToolInPart(MultiplyChain(TestChain(t)), part), TestPoint(t));
+  };
+  const double t = 0.7, h = 1e-4;
+  const Eigen::Vector3d v =
+      (8.0 * (at(t + h).r_mm - at(t - h).r_mm) - (at(t + 2 * h).r_mm - at(t - 2 * h).r_mm)) / (12 * h);
+  const Eigen::Vector3d a = (8.0 * (at(t + h).v_mm_per_s - at(t - h).v_mm_per_s) -
+                             (at(t + 2 * h).v_mm_per_s - at(t - 2 * h).v_mm_per_s)) /
+                            (12 * h);
+  EXPECT_LT((at(t).v_mm_per_s - v).norm(), 1e-8 * v.norm());
+  EXPECT_LT((at(t).a_mm_per_s2 - a).norm(), 1e-8 * a.norm());
 }
 
 }  // namespace

@@ -299,6 +299,63 @@ TEST_F(KinematicsService, StreamsBatchesInOrder) {
   EXPECT_TRUE(stream->Finish().ok());
 }
 
+// Three messages of which the second cannot be understood: an answer, then the status of the second.
+template <class Request, class Response, class Open>
+void ExpectAnswersInOrder(Open open, const Request& good, const std::string& reason) {
+  for (const bool broken : {false, true}) {
+    grpc::ClientContext context;
+    SetDeadline(context, 20.0);
+    auto stream = open(&context);
+    stream->Write(good);
+    stream->Write(broken ? Request() : good);
+    stream->WritesDone();
+    Response response;
+    int received = 0;
+    while (stream->Read(&response)) {
+      EXPECT_GT(response.ByteSizeLong(), 8u);
+      ++received;
+    }
+    EXPECT_EQ(received, broken ? 1 : 2);
+    EXPECT_EQ(TroubleReason(FromWire(stream->Finish())), broken ? reason : "");
+  }
+}
+
+TEST_F(KinematicsService, StreamsEveryShortQuestion) {
+  v1::ComputeJacobianBatchRequest jacobians;
+  v1::ReportSingularityBatchRequest reports;
+  jacobians.set_stride(2);
+  reports.set_stride(2);
+  for (const double number : {500.0, 700.0, 100.0, 300.0}) {
+    jacobians.add_pose(number);
+    reports.add_pose(number);
+  }
+  v1::CarryPointBatchRequest points;
+  points.add_tool(v1::ELEMENTARY_MOTION_GAMMA);
+  points.mutable_sample()->Resize(2 * 12, 1.0);
+  v1::SumErrorsRequest errors;
+  errors.add_element()->mutable_chain();
+  errors.mutable_error()->Resize(6, 0.1);
+  v1::SweepSheetRequest sweep;
+  for (const double number : {2000.0, 0.0, 2100.0, 0.0, 2100.0, 100.0}) {
+    (sweep.body_size() > 0 ? sweep.mutable_body(0) : sweep.add_body())->add_vertex_mm(number);
+  }
+  sweep.add_path()->mutable_p_de_mm()->Resize(4, 300.0);
+  ExpectAnswersInOrder<v1::ComputeJacobianBatchRequest, v1::ComputeJacobianBatchResponse>(
+      [&](auto* context) { return stub_->StreamJacobian(context); }, jacobians, "BAD_STRIDE");
+  ExpectAnswersInOrder<v1::ReportSingularityBatchRequest, v1::ReportSingularityBatchResponse>(
+      [&](auto* context) { return stub_->StreamSingularity(context); }, reports, "BAD_STRIDE");
+  ExpectAnswersInOrder<v1::CarryPointBatchRequest, v1::CarryPointBatchResponse>(
+      [&](auto* context) { return stub_->StreamPoints(context); }, points, "TOO_FEW");
+  ExpectAnswersInOrder<v1::SumErrorsRequest, v1::SumErrorsResponse>(
+      [&](auto* context) { return stub_->StreamErrors(context); }, errors, "TOO_FEW");
+  ExpectAnswersInOrder<v1::SweepSheetRequest, v1::SweepSheetResponse>(
+      [&](auto* context) { return stub_->StreamSweeps(context); }, sweep, "TOO_FEW");
+  v1::ComputeJacobianBatchResponse many;
+  EXPECT_TRUE(Call(&Stub::ComputeJacobianBatch, *stub_, jacobians, many).ok());
+  v1::SweepSheetResponse swept;
+  EXPECT_TRUE(Call(&Stub::SweepSheet, *stub_, sweep, swept).ok());
+}
+
 TEST_F(KinematicsService, EndsAStreamAtABatchThatIsNone) {
   grpc::ClientContext context;
   SetDeadline(context, 20.0);

@@ -167,7 +167,7 @@ TEST_F(HexapodWire, AMixedBatchAnswersEachPose) {
     request.add_pose(number);
   }
   v1::SolveInverseBatchResponse response;
-  ASSERT_TRUE(answers_.SolveBatch(request, response).ok());
+  ASSERT_TRUE(answers_.AnswerBatch(request, response).ok());
   ASSERT_EQ(response.reason_size(), 5);
   EXPECT_EQ(response.reason(0), v1::REASON_SOLVED);
   EXPECT_EQ(response.reason(1), v1::REASON_NOT_FINITE);

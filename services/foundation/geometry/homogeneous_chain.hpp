@@ -103,6 +103,17 @@ inline ChainMotion MultiplyChain(std::span<const ChainFactor> factors) {
   return product;
 }
 
+// The way back, from N M = 1 differentiated: N' = -N M' N, N'' = -(2 N' M' + N M'') N.
+inline ChainMotion InverseOf(const ChainMotion& chain) {
+  ChainMotion back;
+  const Eigen::Matrix3d R_back = chain.M.topLeftCorner<3, 3>().transpose();
+  back.M.topLeftCorner<3, 3>() = R_back;
+  back.M.topRightCorner<3, 1>() = -R_back * chain.M.topRightCorner<3, 1>();
+  back.M_rate = -back.M * chain.M_rate * back.M;
+  back.M_acceleration = -(2.0 * back.M_rate * chain.M_rate + back.M * chain.M_acceleration) * back.M;
+  return back;
+}
+
 // Position, velocity (19) and acceleration (20) in the fixed frame of a point given in the chain's last
 // frame.
 inline PointMotion CarryPoint(const ChainMotion& chain, const PointMotion& point) {
@@ -117,10 +128,9 @@ inline PointMotion CarryPoint(const ChainMotion& chain, const PointMotion& point
   return carried;
 }
 
-// Equation (23): a tool point in the part's frame; X_i01 and X_i02 are tool carrier and part in the fixed
-// frame.
-inline Eigen::Vector3d ToolPointInPart(const Pose& X_i01, const Pose& X_i02, const Eigen::Vector3d& r_01_mm) {
-  return X_i02.Inverse() * (X_i01 * r_01_mm);
+// Equation (23) with its derivatives: the tool's chain as seen from the part; both are given in the fixed frame.
+inline ChainMotion ToolInPart(const ChainMotion& tool, const ChainMotion& part) {
+  return InverseOf(part) * tool;
 }
 
 // Six small errors of one element: shifts (mm), then turns (rad).

@@ -1,11 +1,10 @@
 #include "kinematics/bus/pose_door.hpp"
 
-#include <algorithm>
-#include <array>
 #include <optional>
 #include <utility>
 
-#include "kinematics/bus/description_wire.hpp"
+#include "foundation/motion/sequence_guard.hpp"
+#include "kinematics/bus/hexapod_wire.hpp"
 #include "kinematics/bus/pose_wire.hpp"
 #include "lambdajet/calibration/v1/machine_description.schema.hpp"
 #include "lambdajet/calibration/v1/machine_descriptionPubSubTypes.h"
@@ -13,8 +12,11 @@
 #include "lambdajet/drive/v1/statePubSubTypes.h"
 #include "lambdajet/kinematics/v1/pose.schema.hpp"
 #include "lambdajet/kinematics/v1/posePubSubTypes.h"
+#include "lambdajet/kinematics/v1/spatial_pose.schema.hpp"
+#include "lambdajet/kinematics/v1/spatial_posePubSubTypes.h"
 #include "platform/bus/reader.hpp"
 #include "platform/bus/writer.hpp"
+#include "platform/machine_file/machine_file.hpp"
 #include "platform/process/common_clock.hpp"
 #include "platform/telemetry/log.hpp"
 #include "platform/telemetry/metrics.hpp"
@@ -65,12 +67,33 @@ class PoseDoor::Inside {
       return drive.status();
     }
     drive_.emplace(std::move(*drive));
-    return absl::OkStatus();
+    return slot_.hexapod() != nullptr ? OpenHexapod(bus, *slot_.hexapod()) : absl::OkStatus();
   }
 
  private:
+  absl::Status OpenHexapod(Participant& bus, const OwnHexapod& own) {
+    follower_.emplace(own);
+    auto writer = Writer<kinematics_v1::SpatialPosePubSubType>::Open(
+        bus,
+        {kinematics_v1::SPATIAL_POSE_TOPIC, idl::schema::k_lambdajet_kinematics_v1_spatial_pose, "state"});
+    if (!writer.ok()) {
+      return writer.status();
+    }
+    spatial_writer_.emplace(std::move(*writer));
+    auto struts = Reader<kinematics_v1::StrutReadingsPubSubType>::Open(
+        bus,
+        {kinematics_v1::STRUT_READINGS_TOPIC, idl::schema::k_lambdajet_kinematics_v1_spatial_pose, "state"},
+        [this](const kinematics_v1::StrutReadings& sample, const Arrival&) { PublishSpatial(sample); });
+    if (!struts.ok()) {
+      return struts.status();
+    }
+    struts_.emplace(std::move(*struts));
+    return absl::OkStatus();
+  }
+
   void TakeOver(const calibration_v1::MachineDescription& sample) {
-    auto machine = FromWire(sample);
+    auto machine = DescribedMachine({sample.as_designed_yaml().to_string(), sample.parameters(),
+                                     sample.covariance(), sample.version(), sample.hash().to_string()});
     if (!machine.ok()) {
       refused_.Increment();
       log_.Error("description_refused", std::string(machine.status().message()),
@@ -84,20 +107,14 @@ class PoseDoor::Inside {
     on_description_();
   }
 
-  // Sessions are numbers without an order: one that another has taken the place of has ended.
-  bool IsNew(const idl::link::v1::Header& header) {
-    if (header.session() == session_) {
-      const bool newer = header.sequence_number() > sequence_;
-      sequence_ = std::max(sequence_, header.sequence_number());
-      return newer;
+  // Old, repeated, or of a session that has ended.
+  bool IsStale(const idl::link::v1::Header& header, SequenceGuard& guard) {
+    const SampleVerdict verdict = guard.Judge({header.session(), header.sequence_number(), header.time_ns()});
+    const bool stale = verdict == SampleVerdict::kOld || verdict == SampleVerdict::kTwoWriters;
+    if (stale) {
+      dropped_.Increment();
     }
-    if (std::find(ended_.begin(), ended_.end(), header.session()) != ended_.end()) {
-      return false;
-    }
-    ended_[++sessions_ % ended_.size()] = session_;
-    session_ = header.session();
-    sequence_ = header.sequence_number();
-    return true;
+    return stale;
   }
 
   void Publish(const drive_v1::State& drive) {
@@ -105,14 +122,24 @@ class PoseDoor::Inside {
     if (machine == nullptr) {
       return;
     }
-    if (!IsNew(drive.header())) {
-      dropped_.Increment();
+    if (IsStale(drive.header(), drive_guard_)) {
       return;
     }
     ToWire(*machine, drive, pose_);
     pose_.header().session(own_session_);
     pose_.header().sequence_number(++own_sequence_);
     writer_->Write(pose_);
+    poses_.Increment();
+  }
+
+  void PublishSpatial(const kinematics_v1::StrutReadings& readings) {
+    if (IsStale(readings.header(), struts_guard_)) {
+      return;
+    }
+    follower_->ToWire(readings, spatial_pose_);
+    spatial_pose_.header().session(own_session_);
+    spatial_pose_.header().sequence_number(++spatial_sequence_);
+    spatial_writer_->Write(spatial_pose_);
     poses_.Increment();
   }
 
@@ -125,14 +152,17 @@ class PoseDoor::Inside {
   Gauge version_;
   const std::uint64_t own_session_ = static_cast<std::uint64_t>(CommonClock().now_ns());
   std::uint64_t own_sequence_ = 0;
-  std::uint64_t session_ = 0;
-  std::array<std::uint64_t, 8> ended_{};
-  std::size_t sessions_ = 0;
-  std::uint64_t sequence_ = 0;
+  SequenceGuard drive_guard_;
+  SequenceGuard struts_guard_;
+  std::uint64_t spatial_sequence_ = 0;
+  std::optional<HexapodFollower> follower_;
+  kinematics_v1::SpatialPose spatial_pose_;
   kinematics_v1::Pose pose_;
   std::optional<Writer<kinematics_v1::PosePubSubType>> writer_;
   std::optional<Reader<calibration_v1::MachineDescriptionPubSubType>> descriptions_;
-  std::optional<Reader<drive_v1::StatePubSubType>> drive_;  // last: it ends before what it writes to
+  std::optional<Writer<kinematics_v1::SpatialPosePubSubType>> spatial_writer_;
+  std::optional<Reader<drive_v1::StatePubSubType>> drive_;  // last: readers end before what they write to
+  std::optional<Reader<kinematics_v1::StrutReadingsPubSubType>> struts_;
 };
 
 PoseDoor::PoseDoor() = default;

@@ -1,4 +1,5 @@
-// Publishes where the tool and the jet are: reads the drive's sliders from the bus, solves, writes kinematics/pose.
+// Publishes where the tool and the jet are: reads the drive's sliders from the bus, solves, writes kinematics/pose; and where
+// the house has a hexapod, the same from kinematics/strut_readings to kinematics/spatial_pose.
 //
 // Model: one answer a drive sample, in the bus' own thread; samples that are old, repeated or of a session that has ended are
 // counted and dropped. The machine description is taken over as it arrives; until the first one nothing is published.

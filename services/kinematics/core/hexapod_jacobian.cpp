@@ -237,4 +237,23 @@ PlatformMotion PlatformMotionOf(const Hexapod& hexapod, const Pose& X_MP, const 
   return answer;
 }
 
+ToolMotion ToolMotionOf(const Hexapod& hexapod, const Pose& X_MP, const ActuatorMotion& motion) {
+  const PlatformMotion platform = PlatformMotionOf(hexapod, X_MP, motion);
+  const Eigen::Vector3d lever = X_MP.R * hexapod.geometry().X_PT.p_mm;
+  const ToolMotion tool{platform.reason == Reason::kSolved, AtLever(platform.twist, lever),
+                        AtLever(platform.twist, platform.rate, lever)};
+  const bool finite = tool.twist.v_mm_per_s.allFinite() && tool.twist.w_rad_per_s.allFinite() &&
+                      tool.rate.a_mm_per_s2.allFinite() && tool.rate.alpha_rad_per_s2.allFinite();
+  return tool.holds && finite ? tool : ToolMotion{};
+}
+
+ActuatorMotionAnswer ActuatorMotionOfTool(const Hexapod& hexapod, const Pose& X_MP, const Twist& twist,
+                                          const TwistRate& rate) {
+  const Eigen::Vector3d lever = -X_MP.R * hexapod.geometry().X_PT.p_mm;
+  const ActuatorMotion motion =
+      ActuatorMotionOf(hexapod, X_MP, AtLever(twist, lever), AtLever(twist, rate, lever));
+  const bool finite = motion.velocity_mm_per_s.allFinite() && motion.acceleration_mm_per_s2.allFinite();
+  return finite ? ActuatorMotionAnswer{true, motion} : ActuatorMotionAnswer{};
+}
+
 }  // namespace lambdajet::kinematics

@@ -68,4 +68,19 @@ struct PlatformMotion {
 };
 PlatformMotion PlatformMotionOf(const Hexapod& hexapod, const Pose& X_MP, const ActuatorMotion& motion);
 
+// The same for the origin of the tool T. `holds` is false where the pose does not determine the motion or a number
+// overflows; all is 0 then.
+struct ToolMotion {
+  bool holds = false;
+  Twist twist;
+  TwistRate rate;
+};
+ToolMotion ToolMotionOf(const Hexapod& hexapod, const Pose& X_MP, const ActuatorMotion& motion);
+struct ActuatorMotionAnswer {
+  bool holds = false;
+  ActuatorMotion motion;
+};
+ActuatorMotionAnswer ActuatorMotionOfTool(const Hexapod& hexapod, const Pose& X_MP, const Twist& twist,
+                                          const TwistRate& rate);
+
 }  // namespace lambdajet::kinematics

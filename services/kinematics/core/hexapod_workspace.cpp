@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <vector>
 
 #include "foundation/contract/expects.hpp"
 
@@ -129,6 +130,97 @@ HexapodSlice CutSlice(const Hexapod& hexapod, const HexapodWorkspaceRequest& req
     slice.area_mm2 += (i == 0 || i == rows ? 0.5 : 1.0) * step * length;
   }
   return slice;
+}
+
+namespace {
+
+// What stops a side that lies on the row y from moving on to the next row, looked for along its length.
+HexapodBorder RowBorder(const Hexapod& hexapod, const HexapodWorkspaceRequest& request, const Rectangle& r,
+                        double y_mm, double z_mm) {
+  constexpr int kSamples = 200;
+  if (y_mm < request.box.y_min_mm || y_mm > request.box.y_max_mm) {
+    return {};
+  }
+  for (int i = 0; i <= kSamples; ++i) {
+    const double x = r.x_min_mm + (r.x_max_mm - r.x_min_mm) * i / kSamples;
+    const HexapodInverse answer = SolveInAllOrientations(hexapod, request, {x, y_mm, z_mm});
+    if (answer.reason != Reason::kSolved) {
+      return {answer.bound, answer.strut};
+    }
+  }
+  return {};
+}
+
+// Spans of one row: a run in the slice's list.
+struct SliceRow {
+  std::size_t first = 0, last = 0;
+};
+std::vector<SliceRow> RowsOf(const HexapodSlice& slice) {
+  std::vector<SliceRow> rows;
+  for (std::size_t i = 0; i < slice.spans.size(); ++i) {
+    if (i == 0 || slice.spans[i].y_mm != slice.spans[i - 1].y_mm) {
+      rows.push_back({i, i});
+    }
+    rows.back().last = i + 1;
+  }
+  return rows;
+}
+
+// Of a row's spans the part of [from, to] that is longest; both indices stay where the span narrows nothing.
+struct Strip {
+  double from_x_mm, to_x_mm;
+  std::size_t from_span, to_span;
+  double width_mm() const { return to_x_mm - from_x_mm; }
+};
+Strip Narrowed(const HexapodSlice& slice, const SliceRow& row, const Strip& strip) {
+  Strip widest = strip;
+  widest.to_x_mm = widest.from_x_mm;
+  for (std::size_t i = row.first; i < row.last; ++i) {
+    Strip part = strip;
+    if (slice.spans[i].from_x_mm > part.from_x_mm) {
+      part.from_x_mm = slice.spans[i].from_x_mm;
+      part.from_span = i;
+    }
+    if (slice.spans[i].to_x_mm < part.to_x_mm) {
+      part.to_x_mm = slice.spans[i].to_x_mm;
+      part.to_span = i;
+    }
+    widest = part.width_mm() > widest.width_mm() ? part : widest;
+  }
+  return widest;
+}
+
+}  // namespace
+
+HexapodRectangle LargestRectangle(const Hexapod& hexapod, const HexapodWorkspaceRequest& request,
+                                  const HexapodSlice& slice) {
+  const std::vector<SliceRow> rows = RowsOf(slice);
+  const int count = CountOf(request.box.y_min_mm, request.box.y_max_mm, request.step_mm);
+  const double step = (request.box.y_max_mm - request.box.y_min_mm) / count;
+  HexapodRectangle best;
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    for (std::size_t k = rows[i].first; k < rows[i].last; ++k) {
+      const HexapodSpan& span = slice.spans[k];
+      Strip strip{span.from_x_mm, span.to_x_mm, k, k};
+      for (std::size_t j = i + 1; j < rows.size() && strip.width_mm() > 0.0; ++j) {
+        const double y = slice.spans[rows[j].first].y_mm;
+        if (y - slice.spans[rows[j - 1].first].y_mm > 1.5 * step) {
+          break;  // a row between without spans
+        }
+        strip = Narrowed(slice, rows[j], strip);
+        const Rectangle r{strip.from_x_mm, span.y_mm, strip.to_x_mm, y};
+        if (strip.width_mm() > 0.0 && r.area_mm2() > best.rectangle.area_mm2()) {
+          best = {r, {slice.spans[strip.from_span].from, slice.spans[strip.to_span].to, {}, {}}};
+        }
+      }
+    }
+  }
+  if (best.rectangle.area_mm2() > 0.0) {
+    const Rectangle& r = best.rectangle;
+    best.binding[2] = RowBorder(hexapod, request, r, r.y_min_mm - step, slice.z_mm);
+    best.binding[3] = RowBorder(hexapod, request, r, r.y_max_mm + step, slice.z_mm);
+  }
+  return best;
 }
 
 HexapodVoxels FillVoxels(const Hexapod& hexapod, const HexapodWorkspaceRequest& request) {

@@ -9,6 +9,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <string_view>
@@ -16,6 +17,7 @@
 
 #include "kinematics/core/hexapod.hpp"
 #include "kinematics/core/hexapod_singularity.hpp"
+#include "kinematics/core/rectangle.hpp"
 
 namespace lambdajet::kinematics {
 
@@ -53,6 +55,15 @@ struct HexapodSlice {
   double area_mm2 = 0.0;
 };
 HexapodSlice CutSlice(const Hexapod& hexapod, const HexapodWorkspaceRequest& request, double z_mm);
+
+// The largest rectangle with sides along x and y inside a slice, with what binds each side. Lower and upper side lie on rows of
+// the slice, so it is the largest to one step; between two rows it is as true as the spans are.
+struct HexapodRectangle {
+  Rectangle rectangle;                     // empty where nothing is served
+  std::array<HexapodBorder, 4> binding{};  // left, right, lower y, upper y; kNone where the box ends
+};
+HexapodRectangle LargestRectangle(const Hexapod& hexapod, const HexapodWorkspaceRequest& request,
+                                  const HexapodSlice& slice);
 
 // The whole box by its voxels' centres.
 struct HexapodVoxels {

@@ -34,9 +34,9 @@ bool OneStraightRail(const LambdaMechanism& m) {
 lambda::BlockMechanism ForBlocks(const LambdaMechanism& m) {
   return {m.geometry,
           m.geometry.ratio * m.geometry.main_mm,
-          static_cast<double>(m.working_mode.s1),
-          static_cast<double>(m.working_mode.s2),
-          static_cast<double>(m.assembly_mode),
+          m.working_mode.s1,
+          m.working_mode.s2,
+          m.assembly_mode,
           m.rails_apart,
           OneStraightRail(m),
           m.singular_margin_mm,

@@ -20,7 +20,7 @@ namespace lambdajet::kinematics::lambda {
 struct BlockMechanism {
   Geometry<double> geometry;
   double attach_mm;
-  double s1, s2, assembly_mode;
+  int s1, s2, assembly_mode;
   bool rails_apart;
   bool one_straight_rail;
   double singular_margin_mm;
@@ -57,7 +57,7 @@ template <int N>
 struct Step {
   using S = Lanes<N>;
   Geometry<S> g;
-  double s1, s2, assembly;
+  int s1, s2, assembly;
   bool rails_apart;
   S margin_mm;  // the singular margin, wider by rounding
   S coincidence_mm;

@@ -8,7 +8,7 @@
 // tool point is the origin of E, given in D. Actuator positions are encoder readings (rail position = reading
 // + zero). Units: mm, s, rad. Validity: any finite geometry; nonsense is answered with BAD_GEOMETRY, never
 // with an abort. No answer holds NaN or infinity. Threads: values and pure functions. Cost: no allocation; a
-// batch inverse or forward about 5 ns a pose on a common rail. Errors: answers with a Reason; a field named
+// batch inverse or forward 4 to 6 ns a pose on any rails. Errors: answers with a Reason; a field named
 // `positioned` or `differentiable` says whether the numbers hold.
 #pragma once
 

@@ -16,6 +16,7 @@
 // some 20 us; no allocation.
 #pragma once
 
+#include <array>
 #include <string_view>
 
 namespace lambdajet::kinematics {
@@ -32,6 +33,23 @@ struct ServiceAreaMachine {
   double frame_bottom_ratio = 1.3;           // D_HP / a
 };
 std::string_view FaultOf(const ServiceAreaMachine& machine);
+
+// Its numbers by name, for doors and files.
+using ServiceMember = double ServiceAreaMachine::*;
+struct ServiceNumber {
+  std::string_view name;
+  ServiceMember member;
+};
+inline constexpr std::array<ServiceNumber, 9> kServiceNumbers = {
+    {{"base_joint_spacing_mm", &ServiceAreaMachine::base_joint_spacing_mm},
+     {"platform_joint_spacing_mm", &ServiceAreaMachine::platform_joint_spacing_mm},
+     {"strut_min_mm", &ServiceAreaMachine::strut_min_mm},
+     {"strut_max_mm", &ServiceAreaMachine::strut_max_mm},
+     {"tool_length_mm", &ServiceAreaMachine::tool_length_mm},
+     {"tilt_rad", &ServiceAreaMachine::tilt_rad},
+     {"height_mm", &ServiceAreaMachine::height_mm},
+     {"frame_top_ratio", &ServiceAreaMachine::frame_top_ratio},
+     {"frame_bottom_ratio", &ServiceAreaMachine::frame_bottom_ratio}}};
 
 // All intermediate values of the closed form, left half.
 struct PaperServiceArea {

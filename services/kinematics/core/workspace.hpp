@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "kinematics/core/lambda_mechanism.hpp"
+#include "kinematics/core/rectangle.hpp"
 
 namespace lambdajet::kinematics {
 
@@ -38,14 +39,6 @@ struct UsableMargin {
   PoseLimit tightest = PoseLimit::kMainLink;
 };
 UsableMargin FindUsableMargin(const LambdaMechanism& mechanism, const Eigen::Vector2d& p_DE_mm);
-
-struct Rectangle {
-  double x_min_mm = 0.0;
-  double y_min_mm = 0.0;
-  double x_max_mm = 0.0;
-  double y_max_mm = 0.0;
-  double area_mm2() const { return (x_max_mm - x_min_mm) * (y_max_mm - y_min_mm); }
-};
 
 using Outline = std::vector<Eigen::Vector2d>;  // closed; the usable side lies to the left of every edge
 

@@ -25,7 +25,7 @@ class BatchStream final : public grpc::ServerBidiReactor<Request, Response> {
     if (ok) {
       // Only the read that is outstanding gets here, so the slot is nobody else's: the one being written is the other.
       responses_[slot].Clear();
-      status = Guarded([&] { return answers_.SolveBatch(request_, responses_[slot]); });
+      status = Guarded([&] { return answers_.AnswerBatch(request_, responses_[slot]); });
     }
     const std::lock_guard lock(mutex_);
     if (ended_) {

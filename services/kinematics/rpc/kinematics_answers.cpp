@@ -4,11 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <span>
-#include <vector>
 
-#include "foundation/contract/trouble.hpp"
-#include "kinematics/core/hexapod_singularity.hpp"
 #include "kinematics/rpc/mechanism_selection.hpp"
 #include "kinematics/rpc/wire_planar.hpp"
 #include "kinematics/rpc/wire_spatial.hpp"
@@ -16,16 +12,6 @@
 
 namespace lambdajet::kinematics {
 namespace {
-
-template <class Request>
-const v1::WorkingMode* ModeIn(const Request& request) {
-  return request.has_working_mode() ? &request.working_mode() : nullptr;
-}
-
-template <class Request>
-std::optional<int> AssemblyIn(const Request& request) {
-  return request.has_assembly_mode() ? std::optional<int>(request.assembly_mode()) : std::nullopt;
-}
 
 // A question about a hexapod needs X_MT, one about a planar mechanism p_DE.
 template <class Request>
@@ -74,67 +60,6 @@ void AddMotion(const LambdaMechanism& m, const v1::SolveForwardRequest& request,
   const MotionAnswer answer = SolveForwardMotion(m, actuators);
   ToWire(answer.motion.velocity_mm_per_s, *response.mutable_solution()->mutable_velocity());
   ToWire(answer.motion.acceleration_mm_per_s2, *response.mutable_solution()->mutable_acceleration());
-}
-
-absl::Status CheckBatch(std::uint32_t stride, std::uint32_t wanted_stride, int numbers, const char* field) {
-  ArgumentChecks checks;
-  checks.Require(stride == wanted_stride, "stride", "BAD_STRIDE",
-                 fmt::format("{} numbers a pose; this mechanism takes {}", stride, wanted_stride));
-  const auto count = static_cast<std::size_t>(numbers);
-  checks.Require(count % wanted_stride == 0, field, "BAD_STRIDE",
-                 fmt::format("{} numbers are not a whole number of strides of {}", count, wanted_stride));
-  checks.CountInRange(field, count / wanted_stride, 1, kMostPosesPerMessage);
-  return checks.status();
-}
-
-// Six numbers a pose: those that are not finite get their own answer, as every pose of a batch does.
-Reason InverseOf(const Hexapod& hexapod, const double* in, double* out) {
-  const PlatformPose tool{in[0], in[1], in[2], in[3], in[4], in[5]};
-  const HexapodInverse answer = SolveInverseWithMargin(hexapod, PlatformFromTool(hexapod, tool.X_MP()));
-  if (answer.actuators_mm.allFinite()) {
-    std::copy_n(answer.actuators_mm.data(), kStruts, out);
-  }
-  return answer.reason;
-}
-
-Reason ForwardOf(const Hexapod& hexapod, const double* in, double* out) {
-  const HexapodForward answer = SolveForwardFromHome(hexapod, Eigen::Map<const StrutVector>(in));
-  if (answer.reason == Reason::kSolved) {
-    const PlatformPose tool = PlatformPose::Of(ToolFromPlatform(hexapod, answer.X_MP));
-    const double numbers[] = {tool.x_mm, tool.y_mm, tool.z_mm, tool.psi_rad, tool.theta_rad, tool.gamma_rad};
-    std::copy(std::begin(numbers), std::end(numbers), out);
-  }
-  return answer.reason;
-}
-
-using Numbers = google::protobuf::RepeatedField<double>;
-using SolvePlanarBatch = void (*)(const LambdaMechanism&, std::span<const double>, std::span<double>,
-                                  std::span<Reason>);
-using SolveHexapodOne = Reason (*)(const Hexapod&, const double*, double*);
-
-// Answers go straight into the response's field.
-void SolveNumbers(const SelectedMechanism& selected, SolvePlanarBatch planar, SolveHexapodOne spatial,
-                  const Numbers& in, Numbers& out, google::protobuf::RepeatedField<int>& reason_wire,
-                  std::uint32_t& refused) {
-  const std::size_t stride = selected.hexapod ? kStruts : 2;
-  const std::size_t count = static_cast<std::size_t>(in.size()) / stride;
-  out.Resize(in.size(), 0.0);
-  std::vector<Reason> reasons(count);
-  if (selected.hexapod) {
-    for (std::size_t i = 0; i < count; ++i) {
-      reasons[i] = spatial(*selected.hexapod, in.data() + stride * i, out.mutable_data() + stride * i);
-    }
-  } else {
-    planar(selected.planar, {in.data(), 2 * count}, {out.mutable_data(), 2 * count}, reasons);
-  }
-  reason_wire.Resize(static_cast<int>(count), 0);
-  int* const wire = reason_wire.mutable_data();
-  std::uint32_t solved = 0;
-  for (std::size_t i = 0; i < count; ++i) {
-    wire[i] = static_cast<int>(reasons[i]);
-    solved += reasons[i] == Reason::kSolved;
-  }
-  refused = static_cast<std::uint32_t>(count) - solved;
 }
 
 }  // namespace
@@ -198,7 +123,7 @@ absl::Status KinematicsAnswers::SolveForward(const v1::SolveForwardRequest& requ
   }
   ArgumentChecks checks;
   const std::size_t wanted = selected->hexapod ? kStruts : 2;
-  const Numbers& readings = request.actuator_position_mm();
+  const auto& readings = request.actuator_position_mm();
   checks.CountInRange("actuator_position_mm", static_cast<std::size_t>(readings.size()), wanted, wanted);
   checks.AllFinite("actuator_position_mm", readings);
   if (!checks.ok()) {
@@ -222,46 +147,6 @@ absl::Status KinematicsAnswers::SolveForward(const v1::SolveForwardRequest& requ
     AddMotion(selected->planar, request, position_mm, checks, response);
   }
   return checks.status();
-}
-
-absl::Status KinematicsAnswers::SolveBatch(const v1::SolveInverseBatchRequest& request,
-                                           v1::SolveInverseBatchResponse& response) const {
-  const auto selected = SelectMechanism(slot_, request.mechanism(), ModeIn(request), std::nullopt,
-                                        *response.mutable_model_version());
-  if (!selected.ok()) {
-    return selected.status();
-  }
-  const std::uint32_t stride = selected->hexapod ? kStruts : 2;
-  if (absl::Status status = CheckBatch(request.stride(), stride, request.pose_size(), "pose"); !status.ok()) {
-    return status;
-  }
-  std::uint32_t refused = 0;
-  SolveNumbers(*selected, SolveInverseBatch, InverseOf, request.pose(),
-               *response.mutable_actuator_position_mm(), *response.mutable_reason(), refused);
-  response.set_stride(stride);
-  response.set_refused_count(refused);
-  return absl::OkStatus();
-}
-
-absl::Status KinematicsAnswers::SolveBatch(const v1::SolveForwardBatchRequest& request,
-                                           v1::SolveForwardBatchResponse& response) const {
-  const auto selected = SelectMechanism(slot_, request.mechanism(), ModeIn(request), AssemblyIn(request),
-                                        *response.mutable_model_version());
-  if (!selected.ok()) {
-    return selected.status();
-  }
-  const std::uint32_t stride = selected->hexapod ? kStruts : 2;
-  const int numbers = request.actuator_position_mm_size();
-  if (absl::Status status = CheckBatch(request.stride(), stride, numbers, "actuator_position_mm");
-      !status.ok()) {
-    return status;
-  }
-  std::uint32_t refused = 0;
-  SolveNumbers(*selected, SolveForwardBatch, ForwardOf, request.actuator_position_mm(),
-               *response.mutable_pose(), *response.mutable_reason(), refused);
-  response.set_stride(stride);
-  response.set_refused_count(refused);
-  return absl::OkStatus();
 }
 
 absl::Status KinematicsAnswers::ComputeJacobian(const v1::ComputeJacobianRequest& request,

@@ -26,22 +26,72 @@ Rpc::Unary* Rpc::SolveForward(Context* context, const v1::SolveForwardRequest* r
 
 Rpc::Unary* Rpc::SolveInverseBatch(Context* context, const v1::SolveInverseBatchRequest* request,
                                    v1::SolveInverseBatchResponse* response) {
-  return Answer(context, [&] { return answers_.SolveBatch(*request, *response); });
+  return Answer(context, [&] { return answers_.AnswerBatch(*request, *response); });
 }
 
 Rpc::Unary* Rpc::SolveForwardBatch(Context* context, const v1::SolveForwardBatchRequest* request,
                                    v1::SolveForwardBatchResponse* response) {
-  return Answer(context, [&] { return answers_.SolveBatch(*request, *response); });
+  return Answer(context, [&] { return answers_.AnswerBatch(*request, *response); });
 }
 
-grpc::ServerBidiReactor<v1::SolveInverseBatchRequest, v1::SolveInverseBatchResponse>* Rpc::StreamInverse(
-    Context*) {
+Rpc::Unary* Rpc::ComputeJacobianBatch(Context* context, const v1::ComputeJacobianBatchRequest* request,
+                                      v1::ComputeJacobianBatchResponse* response) {
+  return Answer(context, [&] { return answers_.AnswerBatch(*request, *response); });
+}
+
+Rpc::Unary* Rpc::ReportSingularityBatch(Context* context, const v1::ReportSingularityBatchRequest* request,
+                                        v1::ReportSingularityBatchResponse* response) {
+  return Answer(context, [&] { return answers_.AnswerBatch(*request, *response); });
+}
+
+Rpc::Unary* Rpc::CarryPointBatch(Context* context, const v1::CarryPointBatchRequest* request,
+                                 v1::CarryPointBatchResponse* response) {
+  return Answer(context, [&] { return answers_.AnswerBatch(*request, *response); });
+}
+
+Rpc::Unary* Rpc::SumErrors(Context* context, const v1::SumErrorsRequest* request,
+                           v1::SumErrorsResponse* response) {
+  return Answer(context, [&] { return answers_.AnswerBatch(*request, *response); });
+}
+
+Rpc::Unary* Rpc::SweepSheet(Context* context, const v1::SweepSheetRequest* request,
+                            v1::SweepSheetResponse* response) {
+  return Answer(context, [&] { return answers_.AnswerBatch(*request, *response); });
+}
+
+Rpc::Unary* Rpc::CarryPoint(Context* context, const v1::CarryPointRequest* request,
+                            v1::CarryPointResponse* response) {
+  return Answer(context, [&] { return answers_.CarryPoint(*request, *response); });
+}
+
+Rpc::Stream<v1::SolveInverseBatchRequest, v1::SolveInverseBatchResponse>* Rpc::StreamInverse(Context*) {
   return new BatchStream<v1::SolveInverseBatchRequest, v1::SolveInverseBatchResponse>(answers_);
 }
 
-grpc::ServerBidiReactor<v1::SolveForwardBatchRequest, v1::SolveForwardBatchResponse>* Rpc::StreamForward(
-    Context*) {
+Rpc::Stream<v1::SolveForwardBatchRequest, v1::SolveForwardBatchResponse>* Rpc::StreamForward(Context*) {
   return new BatchStream<v1::SolveForwardBatchRequest, v1::SolveForwardBatchResponse>(answers_);
+}
+
+Rpc::Stream<v1::ComputeJacobianBatchRequest, v1::ComputeJacobianBatchResponse>* Rpc::StreamJacobian(
+    Context*) {
+  return new BatchStream<v1::ComputeJacobianBatchRequest, v1::ComputeJacobianBatchResponse>(answers_);
+}
+
+Rpc::Stream<v1::ReportSingularityBatchRequest, v1::ReportSingularityBatchResponse>* Rpc::StreamSingularity(
+    Context*) {
+  return new BatchStream<v1::ReportSingularityBatchRequest, v1::ReportSingularityBatchResponse>(answers_);
+}
+
+Rpc::Stream<v1::CarryPointBatchRequest, v1::CarryPointBatchResponse>* Rpc::StreamPoints(Context*) {
+  return new BatchStream<v1::CarryPointBatchRequest, v1::CarryPointBatchResponse>(answers_);
+}
+
+Rpc::Stream<v1::SumErrorsRequest, v1::SumErrorsResponse>* Rpc::StreamErrors(Context*) {
+  return new BatchStream<v1::SumErrorsRequest, v1::SumErrorsResponse>(answers_);
+}
+
+Rpc::Stream<v1::SweepSheetRequest, v1::SweepSheetResponse>* Rpc::StreamSweeps(Context*) {
+  return new BatchStream<v1::SweepSheetRequest, v1::SweepSheetResponse>(answers_);
 }
 
 Rpc::Unary* Rpc::ComputeJacobian(Context* context, const v1::ComputeJacobianRequest* request,

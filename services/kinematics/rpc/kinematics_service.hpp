@@ -28,10 +28,31 @@ class KinematicsRpc final : public v1::KinematicsService::CallbackService {
                            v1::SolveInverseBatchResponse* response) override;
   Unary* SolveForwardBatch(Context* context, const v1::SolveForwardBatchRequest* request,
                            v1::SolveForwardBatchResponse* response) override;
-  grpc::ServerBidiReactor<v1::SolveInverseBatchRequest, v1::SolveInverseBatchResponse>* StreamInverse(
-      Context* context) override;
-  grpc::ServerBidiReactor<v1::SolveForwardBatchRequest, v1::SolveForwardBatchResponse>* StreamForward(
-      Context* context) override;
+  Unary* ComputeJacobianBatch(Context* context, const v1::ComputeJacobianBatchRequest* request,
+                              v1::ComputeJacobianBatchResponse* response) override;
+  Unary* ReportSingularityBatch(Context* context, const v1::ReportSingularityBatchRequest* request,
+                                v1::ReportSingularityBatchResponse* response) override;
+  Unary* CarryPoint(Context* context, const v1::CarryPointRequest* request,
+                    v1::CarryPointResponse* response) override;
+  Unary* CarryPointBatch(Context* context, const v1::CarryPointBatchRequest* request,
+                         v1::CarryPointBatchResponse* response) override;
+  Unary* SumErrors(Context* context, const v1::SumErrorsRequest* request,
+                   v1::SumErrorsResponse* response) override;
+  Unary* SweepSheet(Context* context, const v1::SweepSheetRequest* request,
+                    v1::SweepSheetResponse* response) override;
+
+  template <class Request, class Response>
+  using Stream = grpc::ServerBidiReactor<Request, Response>;
+  Stream<v1::SolveInverseBatchRequest, v1::SolveInverseBatchResponse>* StreamInverse(Context*) override;
+  Stream<v1::SolveForwardBatchRequest, v1::SolveForwardBatchResponse>* StreamForward(Context*) override;
+  Stream<v1::ComputeJacobianBatchRequest, v1::ComputeJacobianBatchResponse>* StreamJacobian(
+      Context*) override;
+  Stream<v1::ReportSingularityBatchRequest, v1::ReportSingularityBatchResponse>* StreamSingularity(
+      Context*) override;
+  Stream<v1::CarryPointBatchRequest, v1::CarryPointBatchResponse>* StreamPoints(Context*) override;
+  Stream<v1::SumErrorsRequest, v1::SumErrorsResponse>* StreamErrors(Context*) override;
+  Stream<v1::SweepSheetRequest, v1::SweepSheetResponse>* StreamSweeps(Context*) override;
+
   Unary* ComputeJacobian(Context* context, const v1::ComputeJacobianRequest* request,
                          v1::ComputeJacobianResponse* response) override;
   Unary* ReportSingularity(Context* context, const v1::ReportSingularityRequest* request,

@@ -22,6 +22,12 @@ std::string GeometryHash(const Message& geometry) {
   return fmt::format("{:012x}", hash >> 16);
 }
 
+absl::Status UnknownMachine(const std::string& served, const std::string& wanted) {
+  return Trouble(absl::StatusCode::kNotFound, "UNKNOWN_MACHINE",
+                 fmt::format("this service serves {}, not {}", served,
+                             IsUtf8(wanted) ? wanted.substr(0, 64) : "the machine asked for"));
+}
+
 absl::Status CheckVersion(const v1::MechanismSelection& wire, const ActiveMachine& machine) {
   if (!wire.has_version() || wire.version() == machine.description.version) {
     return absl::OkStatus();
@@ -41,6 +47,23 @@ absl::Status TakeMachine(const MachineSlot& slot, const v1::MechanismSelection& 
   ToWire((*machine)->description, version);
   selected.planar = (*machine)->mechanism;
   return CheckVersion(wire, **machine);
+}
+
+absl::Status TakeOwnHexapod(const MachineSlot& slot, const v1::MechanismSelection& wire,
+                            SelectedMechanism& selected, lambdajet::machine::v1::ModelVersion& version) {
+  const OwnHexapod* own = slot.hexapod();
+  if (own == nullptr) {
+    return Trouble(
+        absl::StatusCode::kFailedPrecondition, "NO_HEXAPOD",
+        "this service was started without a hexapod file; start it with one, or bring a geometry along");
+  }
+  if (!wire.machine_id().empty() && wire.machine_id() != own->machine_id) {
+    return UnknownMachine(own->machine_id, wire.machine_id());
+  }
+  version.set_machine_id(own->machine_id);
+  version.set_hash(own->hash);
+  selected.hexapod = own->hexapod;
+  return absl::OkStatus();
 }
 
 // A client's own geometry needs no machine, but names the one that is there.
@@ -77,9 +100,7 @@ absl::StatusOr<std::shared_ptr<const ActiveMachine>> SelectMachine(const Machine
                    "no machine description has arrived yet; start calibration, or bring a geometry along");
   }
   if (!wanted_id.empty() && wanted_id != machine->description.machine_id) {
-    return Trouble(absl::StatusCode::kNotFound, "UNKNOWN_MACHINE",
-                   fmt::format("this service serves {}, not {}", machine->description.machine_id,
-                               IsUtf8(wanted_id) ? wanted_id.substr(0, 64) : "the machine asked for"));
+    return UnknownMachine(machine->description.machine_id, wanted_id);
   }
   return machine;
 }
@@ -92,6 +113,10 @@ absl::StatusOr<SelectedMechanism> SelectMechanism(const MachineSlot& slot, const
   ArgumentChecks checks;
   if (wire.geometry_case() == v1::MechanismSelection::GEOMETRY_NOT_SET) {
     if (absl::Status status = TakeMachine(slot, wire, selected, version); !status.ok()) {
+      return status;
+    }
+  } else if (wire.has_own_hexapod()) {
+    if (absl::Status status = TakeOwnHexapod(slot, wire, selected, version); !status.ok()) {
       return status;
     }
   } else {

@@ -1,7 +1,8 @@
-// Finds the mechanism that a question is about: the machine's own lambda, or the geometry the request brings along.
+// Finds the mechanism that a question is about: the machine's own lambda, the house's own hexapod, or the geometry the
+// request brings along.
 //
 // Errors: INVALID_ARGUMENT with the field's reason; NOT_FOUND UNKNOWN_MACHINE; FAILED_PRECONDITION NO_MACHINE_DESCRIPTION
-// or VERSION_MISMATCH.
+// or VERSION_MISMATCH, or NO_HEXAPOD.
 // Threads: pure, but for the slot. Cost: for the machine's own mechanism a copy of some 300 bytes.
 #pragma once
 
@@ -31,5 +32,15 @@ absl::StatusOr<std::shared_ptr<const ActiveMachine>> SelectMachine(const Machine
                                                                    const std::string& wanted_id);
 
 void ToWire(const MachineDescription& machine, lambdajet::machine::v1::ModelVersion& wire);
+
+// What a request says of modes in the fields that every question has.
+template <class Request>
+const v1::WorkingMode* ModeIn(const Request& request) {
+  return request.has_working_mode() ? &request.working_mode() : nullptr;
+}
+template <class Request>
+std::optional<int> AssemblyIn(const Request& request) {
+  return request.has_assembly_mode() ? std::optional<int>(request.assembly_mode()) : std::nullopt;
+}
 
 }  // namespace lambdajet::kinematics

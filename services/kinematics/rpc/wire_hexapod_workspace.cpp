@@ -96,6 +96,19 @@ void ToWire(const HexapodSlice& slice, v1::HexapodSlice& wire) {
   }
 }
 
+void ToWire(const HexapodRectangle& found, v1::HexapodSlice& wire) {
+  const Rectangle& r = found.rectangle;
+  if (!(r.area_mm2() > 0.0)) {
+    return;
+  }
+  for (const double number : {r.x_min_mm, r.y_min_mm, r.x_max_mm, r.y_max_mm}) {
+    wire.add_rectangle_mm(number);
+  }
+  for (const HexapodBorder& border : found.binding) {
+    wire.add_rectangle_bound(ToWire(border.bound));
+  }
+}
+
 void ToWire(const HexapodVoxels& voxels, v1::HexapodVoxels& wire) {
   wire.set_count_x(static_cast<std::uint32_t>(voxels.count_x));
   wire.set_count_y(static_cast<std::uint32_t>(voxels.count_y));
@@ -126,7 +139,10 @@ absl::Status ComputeHexapodWorkspace(const MachineSlot& slot,
   }
   asked.cancelled = cancelled;
   for (const double z : request.slice_z_mm()) {
-    ToWire(CutSlice(*selected->hexapod, asked, z), *response.add_slice());
+    const HexapodSlice slice = CutSlice(*selected->hexapod, asked, z);
+    v1::HexapodSlice& wire = *response.add_slice();
+    ToWire(slice, wire);
+    ToWire(LargestRectangle(*selected->hexapod, asked, slice), wire);
   }
   if (request.voxels()) {
     ToWire(FillVoxels(*selected->hexapod, asked), *response.mutable_voxels());

@@ -9,6 +9,7 @@
 
 #include "kinematics/core/hexapod_jacobian.hpp"
 #include "kinematics/core/hexapod_singularity.hpp"
+#include "kinematics/core/service_rectangle.hpp"
 #include "kinematics/rpc/wire_planar.hpp"
 
 namespace lambdajet::kinematics {
@@ -17,14 +18,6 @@ namespace {
 constexpr double kLargestMm = 1e6;
 constexpr double kLargestRad = 1e3;
 constexpr double kUnlimitedRad = 3.15;
-
-Eigen::Vector3d VectorFromWire(const v1::SpatialVector& wire, const std::string& field,
-                               ArgumentChecks& checks) {
-  checks.InRange(field + ".x_mm", wire.x_mm(), -kLargestMm, kLargestMm, "mm");
-  checks.InRange(field + ".y_mm", wire.y_mm(), -kLargestMm, kLargestMm, "mm");
-  checks.InRange(field + ".z_mm", wire.z_mm(), -kLargestMm, kLargestMm, "mm");
-  return {wire.x_mm(), wire.y_mm(), wire.z_mm()};
-}
 
 double AngleFromWire(double angle_rad, const std::string& field, ArgumentChecks& checks) {
   checks.InRange(field, angle_rad, -kLargestRad, kLargestRad, "rad");
@@ -106,8 +99,8 @@ void StrutFromWire(const v1::HexapodGeometry& wire, int j, HexapodGeometry& geom
                    ArgumentChecks& checks) {
   const std::string field = fmt::format("mechanism.hexapod.strut[{}]", j);
   const v1::StrutGeometry& strut = wire.strut(j);
-  geometry.p_MA_mm.col(j) = VectorFromWire(strut.p_ma(), field + ".p_MA", checks);
-  geometry.p_PB_mm.col(j) = VectorFromWire(strut.p_pb(), field + ".p_PB", checks);
+  geometry.p_MA_mm.col(j) = FromWire(strut.p_ma(), field + ".p_MA", checks);
+  geometry.p_PB_mm.col(j) = FromWire(strut.p_pb(), field + ".p_PB", checks);
   checks.InRange(field + ".length_zero_mm", strut.length_zero_mm(), -kLargestMm, kLargestMm, "mm");
   geometry.length_zero_mm[j] = strut.length_zero_mm();
   if (strut.has_joint()) {
@@ -149,11 +142,6 @@ void SixToWire(const Eigen::Vector3d& first, const Eigen::Vector3d& second,
                google::protobuf::RepeatedField<double>& wire) {
   wire.Add(first.data(), first.data() + 3);
   wire.Add(second.data(), second.data() + 3);
-}
-
-// From the platform's pole to the tool, written in M.
-Eigen::Vector3d ToolLever(const Hexapod& hexapod, const Pose& X_MP) {
-  return X_MP.R * hexapod.geometry().X_PT.p_mm;
 }
 
 std::string BoundMessage(const HexapodInverse& answer) {
@@ -203,23 +191,6 @@ std::string ForwardMessage(const HexapodForward& answer) {
   }
 }
 
-// The numbers of a service area that a request may set, by name.
-struct ServiceNumber {
-  const char* name;
-  double ServiceAreaMachine::*member;
-};
-constexpr std::array<ServiceNumber, 9> kServiceNumbers = {{
-    {"base_joint_spacing_mm", &ServiceAreaMachine::base_joint_spacing_mm},
-    {"platform_joint_spacing_mm", &ServiceAreaMachine::platform_joint_spacing_mm},
-    {"strut_min_mm", &ServiceAreaMachine::strut_min_mm},
-    {"strut_max_mm", &ServiceAreaMachine::strut_max_mm},
-    {"tool_length_mm", &ServiceAreaMachine::tool_length_mm},
-    {"tilt_rad", &ServiceAreaMachine::tilt_rad},
-    {"height_mm", &ServiceAreaMachine::height_mm},
-    {"frame_top_ratio", &ServiceAreaMachine::frame_top_ratio},
-    {"frame_bottom_ratio", &ServiceAreaMachine::frame_bottom_ratio},
-}};
-
 void SetServiceNumber(const std::string& name, double value, const std::string& field,
                       ServiceAreaMachine& machine, ArgumentChecks& checks) {
   for (const ServiceNumber& number : kServiceNumbers) {
@@ -231,6 +202,31 @@ void SetServiceNumber(const std::string& name, double value, const std::string& 
   }
   checks.Require(false, field, "UNKNOWN_PARAMETER",
                  "no number of the service area has this name; see service_area.hpp");
+}
+
+std::string ServiceBoundMessage(const ServiceBound& bound) {
+  const std::string sentence(ServiceLimitSentence(bound.limit));
+  return bound.joint == 0 ? sentence
+                          : fmt::format("{}: the one on joint {}, drill tilted {}phi", sentence, bound.joint,
+                                        bound.tilt_sign > 0 ? "+" : "-");
+}
+
+void RectangleToWire(const ServiceRectangle& found, v1::ServiceArea& wire) {
+  const Rectangle& r = found.rectangle;
+  if (!(r.area_mm2() > 0.0)) {
+    return;
+  }
+  for (const double number : {r.x_min_mm, r.y_min_mm, r.x_max_mm, r.y_max_mm}) {
+    wire.add_rectangle_mm(number);
+  }
+  constexpr std::array<const char*, 4> kSides = {"left", "right", "base", "table"};
+  for (std::size_t i = 0; i < kSides.size(); ++i) {
+    const ServiceBound& bound = found.binding[i];
+    v1::RectangleSide& side = *wire.add_binding();
+    side.set_side(kSides[i]);
+    side.set_reason(bound.joint > 0 ? v1::REASON_ACTUATOR_LIMIT : v1::REASON_OUT_OF_REACH);
+    side.set_message(ServiceBoundMessage(bound));
+  }
 }
 
 }  // namespace
@@ -262,15 +258,25 @@ std::optional<Hexapod> FromWire(const v1::HexapodGeometry& wire, ArgumentChecks&
   return fault.empty() ? std::optional<Hexapod>(geometry) : std::nullopt;
 }
 
+Eigen::Vector3d FromWire(const v1::SpatialVector& wire, const std::string& field, ArgumentChecks& checks) {
+  checks.InRange(field + ".x_mm", wire.x_mm(), -kLargestMm, kLargestMm, "mm");
+  checks.InRange(field + ".y_mm", wire.y_mm(), -kLargestMm, kLargestMm, "mm");
+  checks.InRange(field + ".z_mm", wire.z_mm(), -kLargestMm, kLargestMm, "mm");
+  return {wire.x_mm(), wire.y_mm(), wire.z_mm()};
+}
+
 Pose FromWire(const v1::SpatialPose& wire, const std::string& field, ArgumentChecks& checks) {
-  return {VectorFromWire(wire.position(), field + ".position", checks),
-          RotationFromWire(wire, field, checks)};
+  return {FromWire(wire.position(), field + ".position", checks), RotationFromWire(wire, field, checks)};
+}
+
+void ToWire(const Eigen::Vector3d& vector_mm, v1::SpatialVector& wire) {
+  wire.set_x_mm(vector_mm.x());
+  wire.set_y_mm(vector_mm.y());
+  wire.set_z_mm(vector_mm.z());
 }
 
 void ToWire(const Pose& pose, v1::SpatialPose& wire) {
-  wire.mutable_position()->set_x_mm(pose.p_mm.x());
-  wire.mutable_position()->set_y_mm(pose.p_mm.y());
-  wire.mutable_position()->set_z_mm(pose.p_mm.z());
+  ToWire(pose.p_mm, *wire.mutable_position());
   const KrylovAngles angles = pose.krylov();
   wire.mutable_krylov()->set_psi_rad(angles.psi_rad);
   wire.mutable_krylov()->set_theta_rad(angles.theta_rad);
@@ -306,14 +312,13 @@ void MotionToWire(const Hexapod& hexapod, const Pose& X_MT, const v1::SolveInver
   if (!checks.ok() || !wire.has_solution()) {
     return;
   }
-  const Pose X_MP = PlatformFromTool(hexapod, X_MT);
-  const Eigen::Vector3d lever = -ToolLever(hexapod, X_MP);
-  const Twist tool{twist.head<3>(), twist.tail<3>()};
-  const ActuatorMotion motion = ActuatorMotionOf(hexapod, X_MP, AtLever(tool, lever),
-                                                 AtLever(tool, {rate.head<3>(), rate.tail<3>()}, lever));
-  if (!motion.velocity_mm_per_s.allFinite() || !motion.acceleration_mm_per_s2.allFinite()) {
+  const ActuatorMotionAnswer answer =
+      ActuatorMotionOfTool(hexapod, PlatformFromTool(hexapod, X_MT), {twist.head<3>(), twist.tail<3>()},
+                           {rate.head<3>(), rate.tail<3>()});
+  if (!answer.holds) {
     return;
   }
+  const ActuatorMotion& motion = answer.motion;
   v1::InverseSolution& solution = *wire.mutable_solution();
   solution.mutable_actuator_velocity_mm_per_s()->Add(motion.velocity_mm_per_s.data(),
                                                      motion.velocity_mm_per_s.data() + kStruts);
@@ -332,17 +337,21 @@ void MotionToWire(const Hexapod& hexapod, const v1::SolveForwardRequest& request
   }
   ArgumentChecks own;  // what this service has written itself
   const Pose X_MP = PlatformFromTool(hexapod, FromWire(wire.solution().x_mt(), "X_MT", own));
-  const PlatformMotion motion = PlatformMotionOf(hexapod, X_MP, actuators);
-  if (motion.reason != Reason::kSolved || !motion.rate.a_mm_per_s2.allFinite() ||
-      !motion.rate.alpha_rad_per_s2.allFinite()) {
+  const ToolMotion motion = ToolMotionOf(hexapod, X_MP, actuators);
+  if (!motion.holds) {
     return;
   }
-  const Eigen::Vector3d lever = ToolLever(hexapod, X_MP);
-  const Twist tool = AtLever(motion.twist, lever);
-  const TwistRate rate = AtLever(motion.twist, motion.rate, lever);
   v1::SpatialMotion& out = *wire.mutable_solution()->mutable_motion();
-  SixToWire(tool.v_mm_per_s, tool.w_rad_per_s, *out.mutable_twist());
-  SixToWire(rate.a_mm_per_s2, rate.alpha_rad_per_s2, *out.mutable_twist_rate());
+  SixToWire(motion.twist.v_mm_per_s, motion.twist.w_rad_per_s, *out.mutable_twist());
+  SixToWire(motion.rate.a_mm_per_s2, motion.rate.alpha_rad_per_s2, *out.mutable_twist_rate());
+}
+
+void ParameterNamesToWire(bool hexapod, google::protobuf::RepeatedPtrField<std::string>& wire) {
+  const int count = hexapod ? kStrutParameters : kMechanismParameterCount;
+  for (int i = 0; i < count; ++i) {
+    *wire.Add() = hexapod ? StrutParameterName(static_cast<StrutParameter>(i))
+                          : ParameterName(static_cast<Parameter>(i));
+  }
 }
 
 void JacobianToWire(const Hexapod& hexapod, const Pose& X_MT, v1::ComputeJacobianResponse& wire) {
@@ -356,9 +365,7 @@ void JacobianToWire(const Hexapod& hexapod, const Pose& X_MT, v1::ComputeJacobia
   v1::JacobianSolution& solution = *wire.mutable_solution();
   MatrixToWire(J, *solution.mutable_j_q_x());
   MatrixToWire(ActuatorParameterJacobian(hexapod, X_MP), *solution.mutable_j_q_parameters());
-  for (int i = 0; i < kStrutParameters; ++i) {
-    solution.add_parameter_name(std::string(StrutParameterName(static_cast<StrutParameter>(i))));
-  }
+  ParameterNamesToWire(true, *solution.mutable_parameter_name());
   solution.set_determinant(singularity.determinant);
   solution.set_smallest_singular_value(singularity.smallest_singular_value);
   if (std::isfinite(singularity.condition) && singularity.condition < 1e12) {
@@ -411,6 +418,7 @@ void ToWire(const ServiceAreaMachine& machine, double value, v1::ServiceArea& wi
   wire.set_union_mm2(ExactArea(machine, ServiceRegion::kUnion));
   wire.set_intersection_mm2(ExactArea(machine, ServiceRegion::kIntersection));
   wire.set_single_tilt_mm2(ExactArea(machine, ServiceRegion::kSingleTilt));
+  RectangleToWire(LargestServiceRectangle(machine), wire);
 }
 
 }  // namespace lambdajet::kinematics

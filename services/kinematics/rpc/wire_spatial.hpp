@@ -9,6 +9,7 @@
 #include <string>
 
 #include "kinematics/core/hexapod.hpp"
+#include "kinematics/core/hexapod_jacobian.hpp"
 #include "kinematics/core/service_area.hpp"
 #include "lambdajet/kinematics/v1/kinematics.pb.h"
 #include "platform/rpc/argument_checks.hpp"
@@ -17,6 +18,8 @@ namespace lambdajet::kinematics {
 
 // Nothing if a check failed.
 std::optional<Hexapod> FromWire(const v1::HexapodGeometry& wire, ArgumentChecks& checks);
+Eigen::Vector3d FromWire(const v1::SpatialVector& wire, const std::string& field, ArgumentChecks& checks);
+void ToWire(const Eigen::Vector3d& vector_mm, v1::SpatialVector& wire);
 Pose FromWire(const v1::SpatialPose& wire, const std::string& field, ArgumentChecks& checks);
 void ToWire(const Pose& pose, v1::SpatialPose& wire);
 
@@ -29,6 +32,8 @@ void MotionToWire(const Hexapod& hexapod, const Pose& X_MT, const v1::SolveInver
                   ArgumentChecks& checks, v1::SolveInverseResponse& wire);
 void MotionToWire(const Hexapod& hexapod, const v1::SolveForwardRequest& request, ArgumentChecks& checks,
                   v1::SolveForwardResponse& wire);
+// Columns of J_q_parameters: of a strut, or of a lambda or biglide.
+void ParameterNamesToWire(bool hexapod, google::protobuf::RepeatedPtrField<std::string>& wire);
 void JacobianToWire(const Hexapod& hexapod, const Pose& X_MT, v1::ComputeJacobianResponse& wire);
 void SingularityToWire(const Hexapod& hexapod, const Pose& X_MT, v1::ReportSingularityResponse& wire);
 

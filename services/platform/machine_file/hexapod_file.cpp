@@ -2,6 +2,7 @@
 
 #include <array>
 
+#include "platform/machine_file/machine_file.hpp"
 #include "platform/machine_file/yaml_map_reader.hpp"
 #include "platform/process/atomic_file.hpp"
 
@@ -194,5 +195,7 @@ std::string HexapodText(const HexapodMachine& machine) {
   }
   return text + PoseText("program_zero", machine.motion.X_MT_zero);
 }
+
+std::string HexapodHash(const HexapodMachine& machine) { return ContentHash(HexapodText(machine)); }
 
 }  // namespace lambdajet

@@ -25,5 +25,7 @@ struct HexapodMachine {
 absl::StatusOr<HexapodMachine> ReadHexapodFile(const std::string& path);
 absl::StatusOr<HexapodMachine> ParseHexapod(const std::string& yaml, const std::string& name);
 std::string HexapodText(const HexapodMachine& machine);
+// Of the canonical text: the same hexapod, the same 12 hex digits.
+std::string HexapodHash(const HexapodMachine& machine);
 
 }  // namespace lambdajet
