@@ -222,8 +222,8 @@ void VirtualCell::StepMainMotion() {
   }
   main_motion_->Step(now_ns_, {.commands = commands_to_main_.arrived,
                                .peer = to_main_motion_.arrived,
-                               .process = process_to_main_.arrived,
                                .segments = segments_to_main_.arrived,
+                               .process = process_to_main_.arrived,
                                .link = {}});
   if (cycle_ % 4 == 0) {
     Post(to_drive_, main_motion_->state());

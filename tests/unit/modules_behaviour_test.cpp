@@ -399,7 +399,7 @@ TEST_F(Modules, TheLoopsAllocateNothingAfterStart) {
     drive.Step(now_ns, {.commands = {}, .peer = {&peer, 1}, .segments = {}, .process = {}, .link = link});
     state = drive.state();
     main_motion.Step(now_ns,
-                     {.commands = {}, .peer = {&state, 1}, .process = {}, .segments = {}, .link = link});
+                     {.commands = {}, .peer = {&state, 1}, .segments = {}, .process = {}, .link = link});
     peer = main_motion.state();
   }
   EXPECT_EQ(allocations.load() - before, 0u);

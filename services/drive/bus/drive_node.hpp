@@ -10,39 +10,22 @@
 
 #include "absl/status/statusor.h"
 #include "drive/core/drive_core.hpp"
-#include "platform/config/schema.hpp"
-
-namespace lambdajet {
-class CommonClock;
-class Log;
-class Metrics;
-class Participant;
-}  // namespace lambdajet
+#include "link/bus/node_config.hpp"
 
 namespace lambdajet::drive {
 
 struct NodeConfig {
   DriveConfig core;
-  int fifo_priority = 50;
-  int cpu = -1;
-  bool lock_memory = false;
-  int state_every = 2;  // control periods
+  link::LoopConfig loop;
 
   void Declare(ConfigSchema& schema);
-};
-
-struct NodeParts {
-  Participant& bus;
-  const CommonClock& clock;
-  Log& log;
-  Metrics& metrics;
 };
 
 class DriveNode {
  public:
   // All references outlive the node. `after_cycle` is called in the loop. `running` is called once, from the loop.
-  static absl::StatusOr<std::unique_ptr<DriveNode>> Open(const NodeParts& parts, const NodeConfig& config,
-                                                         DriveHardware& hardware,
+  static absl::StatusOr<std::unique_ptr<DriveNode>> Open(const link::NodeParts& parts,
+                                                         const NodeConfig& config, DriveHardware& hardware,
                                                          std::function<void(const DriveState&)> after_cycle,
                                                          std::function<void()> running);
   ~DriveNode();  // stops the loop

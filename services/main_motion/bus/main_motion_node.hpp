@@ -10,40 +10,23 @@
 #include <memory>
 
 #include "absl/status/statusor.h"
+#include "link/bus/node_config.hpp"
 #include "main_motion/core/main_motion_core.hpp"
-#include "platform/config/schema.hpp"
-
-namespace lambdajet {
-class CommonClock;
-class Log;
-class Metrics;
-class Participant;
-}  // namespace lambdajet
 
 namespace lambdajet::main_motion {
 
 struct NodeConfig {
   MainMotionConfig core;
-  int fifo_priority = 50;
-  int cpu = -1;
-  bool lock_memory = false;
-  int state_every = 4;  // control periods
+  link::LoopConfig loop{.state_every = 4};
 
   void Declare(ConfigSchema& schema);
-};
-
-struct NodeParts {
-  Participant& bus;
-  const CommonClock& clock;
-  Log& log;
-  Metrics& metrics;
 };
 
 class MainMotionNode {
  public:
   // All references outlive the node. `after_cycle` is called in the loop. `running` is called once, from the loop.
   static absl::StatusOr<std::unique_ptr<MainMotionNode>> Open(
-      const NodeParts& parts, const NodeConfig& config, MainMotionHardware& hardware,
+      const link::NodeParts& parts, const NodeConfig& config, MainMotionHardware& hardware,
       std::function<void()> before_cycle, std::function<void(const MainMotionState&)> after_cycle,
       std::function<void()> running);
   ~MainMotionNode();  // stops the loop

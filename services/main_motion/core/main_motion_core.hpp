@@ -48,8 +48,8 @@ struct MainMotionConfig {
 struct MainMotionInputs {
   std::span<const ModuleCommand> commands;
   std::span<const DriveState> peer;
-  std::span<const ProcessBatch> process;
   std::span<const SegmentBatch> segments;
+  std::span<const ProcessBatch> process;
   LinkFigures link;
 };
 
