@@ -137,8 +137,12 @@ void DrawRectangle(PlotFrame& frame, const Rectangle& r) {
 }
 
 std::string BoundOf(const char* side, const ServiceBound& bound) {
-  return fmt::format("{} {}", side, ServiceLimitSentence(bound.limit)) +
-         (bound.joint > 0 ? fmt::format(" ({}, {}phi)", bound.joint, bound.tilt_sign > 0 ? "+" : "-") : "");
+  if (bound.joint == 0) {
+    return fmt::format("{}: {}", side, ServiceLimitSentence(bound.limit));
+  }
+  return fmt::format("{}: strut {} at its {} at {}phi", side, bound.joint,
+                     bound.limit == ServiceLimit::kStrutLongest ? "longest" : "shortest",
+                     bound.tilt_sign > 0 ? "+" : "-");
 }
 
 // The rectangle in the region that both tilts serve, and under the picture what binds its sides.
@@ -149,12 +153,13 @@ void DrawServiceRectangle(Picture& picture, PlotFrame& frame, const ServiceAreaM
     return;
   }
   DrawRectangle(frame, r);
-  picture.Text(680, 626,
-               fmt::format("largest rectangle {:.0f} x {:.0f} mm: {}; {};", r.x_max_mm - r.x_min_mm,
-                           r.y_max_mm - r.y_min_mm, BoundOf("left", found.binding[0]),
-                           BoundOf("right", found.binding[1])),
-               12, kGrey);
-  picture.Text(680, 642, BoundOf("above", found.binding[2]) + "; " + BoundOf("below", found.binding[3]), 12,
+  picture.Text(
+      680, 626,
+      fmt::format("largest rectangle {:.0f} x {:.0f} mm", r.x_max_mm - r.x_min_mm, r.y_max_mm - r.y_min_mm),
+      12, kGrey);
+  picture.Text(680, 642, BoundOf("left", found.binding[0]) + "; " + BoundOf("right", found.binding[1]), 12,
+               kGrey);
+  picture.Text(680, 658, BoundOf("above", found.binding[2]) + "; " + BoundOf("below", found.binding[3]), 12,
                kGrey);
 }
 
@@ -165,7 +170,7 @@ absl::Status DrawServiceArea(const std::vector<std::string>& settings, const std
   }
   const ServiceAreaMachine& m = *machine;
   const PaperServiceArea paper = PaperClosedForm(m);
-  Picture picture(1240, 656);
+  Picture picture(1240, 672);
   PlotFrame left =
       ServiceFrame(picture, {70, 60, 520, 480}, m,
                    "The paper's parts (Fig. 2), left half; closed form " +
@@ -271,6 +276,8 @@ Colour LengthColour(double length, double shortest, double longest) {
   return {0.12 + 0.7 * share, 0.38 - 0.2 * share, 0.75 - 0.6 * share};
 }
 
+double WholeDegrees(double angle_rad) { return std::round(angle_rad / kDeg) + 0.0; }  // never -0
+
 void DrawMechanism(Picture& picture, PlotFrame::Place place, const Hexapod& hexapod, const Pose& X_MP) {
   const HexapodGeometry& g = hexapod.geometry();
   const Pose X_MT = ToolFromPlatform(hexapod, X_MP);
@@ -287,11 +294,13 @@ void DrawMechanism(Picture& picture, PlotFrame::Place place, const Hexapod& hexa
   const HexapodInverse answer = SolveInverseWithMargin(hexapod, X_MP);
   const PlatformPose shown = PlatformPose::Of(X_MT);
   PlotFrame frame(
-      picture, place, {x_low->first - 60, x_high->first + 60, "seen from the side, mm"},
+      picture, place,
+      {x_low->first - 60, x_high->first + 60,
+       "seen from the side, mm; struts with their lengths, mm, blue at the shortest, red at the longest"},
       {y_low - 80, y_high + 80, "mm"},
       fmt::format("tool at ({:.0f}, {:.0f}, {:.0f}) mm, psi {:.0f} theta {:.0f} gamma {:.0f} deg: {}",
-                  shown.x_mm, shown.y_mm, shown.z_mm, shown.psi_rad / kDeg, shown.theta_rad / kDeg,
-                  shown.gamma_rad / kDeg, ReasonName(answer.reason)),
+                  shown.x_mm, shown.y_mm, shown.z_mm, WholeDegrees(shown.psi_rad),
+                  WholeDegrees(shown.theta_rad), WholeDegrees(shown.gamma_rad), ReasonName(answer.reason)),
       true);
   frame.Area(SeenRing({}, g.p_MA_mm), kPale.Faded(0.8));
   frame.Line(SeenRing({}, g.p_MA_mm), kInk, 1.6);
