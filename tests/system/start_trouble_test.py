@@ -100,7 +100,7 @@ class StartTrouble(unittest.TestCase):
 
     def test_files_that_are_missing_are_named_with_what_to_do(self):
         with under_test.private_domain() as domain, tempfile.TemporaryDirectory() as folder:
-            for setting, advice in (("bus.key_file", "openssl rand -hex 32"), ("rpc.certificate_file", "name PEM files"),
+            for setting, advice in (("bus.key_file", "openssl rand -hex 32"), ("rpc.certificate_file", "a PEM file that this user may read is right"),
                                     ("bus.profile_file", "deploy/dds/profiles.xml is the one to name")):
                 code, said = run("kinematics", *flags_of("kinematics", domain, folder), f"--{setting}=/nowhere/at-all")
                 self.assertNotEqual(code, 0, setting)

@@ -29,9 +29,7 @@ absl::StatusOr<std::string> ReadPem(const std::string& file) {
     return pem;
   }
   return Trouble(pem.status().code(), TroubleReason(pem.status()),
-                 std::string(pem.status().message()) +
-                     "; rpc.certificate_file, rpc.key_file and rpc.client_ca_file name PEM files that this "
-                     "user may read",
+                 std::string(pem.status().message()) + "; a PEM file that this user may read is right",
                  {{"path", file}});
 }
 

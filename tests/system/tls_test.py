@@ -1,0 +1,128 @@
+"""Live houses over TLS with certificates made by openssl: who trusts the wrong authority, shows no certificate or a foreign one,
+or speaks plaintext is turned away; the cell asks trajectory over mutual TLS; plaintext beyond loopback is refused."""
+
+import pathlib
+import subprocess
+import sys
+import tempfile
+import time
+import types
+import unittest
+
+import cell_under_test as under_test
+
+BUILD = pathlib.Path(sys.argv.pop(1))
+UNREACHABLE, DONE = 3, 0
+PATIENCE_S = 20
+
+
+class Authority:
+    """A certificate authority and what it has signed, all in one folder."""
+
+    def __init__(self, folder):
+        self.folder = folder
+        folder.mkdir()
+        self.openssl("req", "-x509", *self.new_key("ca"), "-days", "2", "-subj", "/CN=test-ca", "-out", folder / "ca.pem")
+        self.ca = folder / "ca.pem"
+
+    @staticmethod
+    def openssl(*words):
+        subprocess.run(["openssl", *map(str, words)], check=True, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
+                       stderr=subprocess.DEVNULL)
+
+    def new_key(self, name):
+        return ["-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes", "-keyout", self.folder / f"{name}.key"]
+
+    def issue(self, name):
+        """(certificate, key) of a host on this one."""
+        request, names, certificate = (self.folder / f"{name}.{end}" for end in ("csr", "cnf", "pem"))
+        names.write_text("subjectAltName=IP:127.0.0.1,DNS:localhost\n")
+        self.openssl("req", *self.new_key(name), "-subj", f"/CN={name}", "-out", request)
+        self.openssl("x509", "-req", "-days", "1", "-in", request, "-CA", self.ca, "-CAkey", self.folder / "ca.key", "-CAcreateserial",
+                     "-extfile", names, "-out", certificate)
+        return certificate, self.folder / f"{name}.key"
+
+
+class Tls(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = pathlib.Path(cls.enterClassContext(tempfile.TemporaryDirectory(prefix="lambdajet-tls-")))
+        cls.authority, cls.stranger = Authority(cls.folder / "ours"), Authority(cls.folder / "theirs")
+        cls.server, cls.client = cls.authority.issue("server"), cls.authority.issue("client")
+        cls.foreign = cls.stranger.issue("client")
+
+    def setUp(self):
+        domain = self.enterContext(under_test.private_domain())
+        run = self.enterContext(tempfile.TemporaryDirectory(prefix="lambdajet-tls-run-"))
+        options = types.SimpleNamespace(machine=under_test.SOURCE / "deploy" / "config" / "machine.yaml", plant=None, seed=1)
+        self.processes = under_test.cell_processes.LocalProcesses(
+            under_test.SOURCE, BUILD, pathlib.Path(run), options, flags=[f"--bus.domain={domain}", "--metrics.address=127.0.0.1:0"],
+            ports=under_test.cell_processes.free_ports())
+        self.addCleanup(self.processes.stop)
+
+    def start(self, *names, mutual, further=()):
+        """Starts houses over TLS and waits until each has announced itself."""
+        self.processes.flags += [f"--rpc.certificate_file={self.server[0]}", f"--rpc.key_file={self.server[1]}"]
+        self.processes.flags += [f"--rpc.client_ca_file={self.authority.ca}"] if mutual else []
+        for name in names:
+            self.processes.flags += further if name == "cell" else []
+            self.processes.start_one(name)
+        deadline = time.monotonic() + PATIENCE_S
+        while not all(self.processes.announced(name) for name in names):
+            self.processes.check_alive()
+            self.assertLess(time.monotonic(), deadline, [self.processes.last_words(name) for name in names])
+            time.sleep(0.02)
+
+    def ask(self, *words, ca=None, own=None):
+        """(exit code, all that was said)"""
+        flags = ["--announce-dir", str(self.processes.folder), "--timeout", "5"]
+        flags += ["--ca", str(ca)] if ca else []
+        flags += ["--certificate", str(own[0]), "--key", str(own[1])] if own else []
+        done = subprocess.run([str(BUILD / "bin" / "lambdajet"), *flags, *words], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                              stderr=subprocess.STDOUT, timeout=60, check=False)
+        return done.returncode, done.stdout.decode()
+
+    def turned_away(self, **flags):
+        code, said = self.ask("calibration", "versions", **flags)
+        self.assertEqual(code, UNREACHABLE, said)
+        self.assertIn("calibration at 127.0.0.1", said)
+
+    def test_a_server_certificate_is_checked_by_the_client(self):
+        self.start("calibration", mutual=False)
+        code, said = self.ask("calibration", "versions", ca=self.authority.ca)
+        self.assertEqual((code, "machine file" in said), (DONE, True), said)
+        self.turned_away(ca=self.stranger.ca)
+        self.turned_away()  # plaintext to a TLS port
+
+    def test_a_client_must_show_a_certificate_of_the_named_authority(self):
+        self.start("calibration", mutual=True)
+        code, said = self.ask("calibration", "versions", ca=self.authority.ca, own=self.client)
+        self.assertEqual((code, "machine file" in said), (DONE, True), said)
+        self.turned_away(ca=self.authority.ca)
+        self.turned_away(ca=self.authority.ca, own=self.foreign)
+        code, said = self.ask("calibration", "versions", ca=self.authority.ca, own=(self.client[0], self.server[1]))
+        self.assertIn("KEY_MISMATCH", said)
+
+    def test_the_cell_asks_trajectory_over_mutual_tls(self):
+        self.start("calibration", "trajectory", "cell", mutual=True,
+                   further=[f"--trajectory.ca_file={self.authority.ca}", f"--trajectory.certificate_file={self.client[0]}",
+                            f"--trajectory.key_file={self.client[1]}"])
+        deadline = time.monotonic() + PATIENCE_S
+        said = ""
+        while "trajectory   SERVING" not in said:
+            self.assertLess(time.monotonic(), deadline, said)
+            _, said = self.ask("machine", "state", ca=self.authority.ca, own=self.client)
+
+    def test_plaintext_beyond_loopback_is_refused_and_tls_is_served(self):
+        refused = subprocess.run([str(BUILD / "bin" / "calibration"), *self.processes.arguments("calibration"), "--rpc.address=0.0.0.0:0"],
+                                 stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=30, check=False)
+        self.assertNotEqual(refused.returncode, 0)
+        self.assertIn("name a certificate and a key, or say rpc.allow_plaintext: true", refused.stdout.decode())
+        self.processes.flags.append("--rpc.address=0.0.0.0:0")
+        self.start("calibration", mutual=False)
+        code, said = self.ask("calibration", "versions", ca=self.authority.ca)
+        self.assertEqual(code, DONE, said)
+
+
+if __name__ == "__main__":
+    unittest.main()
