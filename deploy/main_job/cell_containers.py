@@ -101,8 +101,9 @@ class Containers:
         console = "from the host's programs" if programs == "host" else "from the sources; ccache has what was compiled before"
         print(f"  making the image {IMAGE} {console}", flush=True)
         began = time.monotonic()
-        self.call("buildah", "bud", "--isolation", "chroot", "--layers", "--build-arg", f"BASE={BASE}", "--build-arg", f"PROGRAMS={programs}",
-                  "--volume", f"{cache}:/ccache", "--tag", IMAGE, "--file", "deploy/Containerfile", ".")
+        self.call("buildah", "bud", "--isolation", "chroot", "--layers", "--force-rm", "--build-arg", f"BASE={BASE}",
+                  "--build-arg", f"PROGRAMS={programs}", "--volume", f"{cache}:/ccache", "--tag", IMAGE,
+                  "--file", "deploy/Containerfile", ".")
         print(f"  the image is there after {time.monotonic() - began:.0f} s", flush=True)
 
     def real_time_words(self):

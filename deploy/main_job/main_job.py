@@ -287,7 +287,8 @@ def stopped_by_signal(number, _frame):
 
 def main():
     options = parse()
-    signal.signal(signal.SIGTERM, stopped_by_signal)
+    for number in (signal.SIGINT, signal.SIGTERM):  # also where a shell has started this with SIGINT ignored
+        signal.signal(number, stopped_by_signal)
     console = Console()
     run = Run(options)
     processes = make_processes(options)

@@ -6,4 +6,4 @@ foreach(script start_trouble_test prometheus_test tls_test disk_full_test cli_li
       ENVIRONMENT "LAMBDAJET_PYTHON_STUBS=${CMAKE_BINARY_DIR}/python")
   endif()
 endforeach()
-set_tests_properties(system_cli_live_test PROPERTIES RUN_SERIAL TRUE)
+set_tests_properties(system_cli_live_test system_disk_full_test PROPERTIES RUN_SERIAL TRUE)

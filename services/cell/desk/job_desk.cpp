@@ -12,6 +12,7 @@ namespace {
 
 constexpr double kCheckpoint_s = 2.0;
 constexpr double kAdmissionRetry_s = 1.0;
+constexpr double kJournalRetry_s = 0.5;
 constexpr std::size_t kMostAnnouncements = 256;
 constexpr std::size_t kMostAdmissionsWaiting = 1000;
 
@@ -189,7 +190,7 @@ void JobDesk::Carry(std::vector<Action> actions) {
 void JobDesk::CheckpointIfDue(std::int64_t now_ns) {
   const bool over = !active_ || !HoldsMachine(active_->progress.state);
   const bool anything = !recorder_.gathered().trace.empty() || !recorder_.gathered().events.empty();
-  if (!active_ || (now_ns < next_checkpoint_ns_ && !over) || !anything) {
+  if (!active_ || (now_ns < next_checkpoint_ns_ && !(over && journal_trouble_.empty())) || !anything) {
     return;
   }
   next_checkpoint_ns_ = After(now_ns, kCheckpoint_s);
@@ -205,6 +206,14 @@ void JobDesk::CheckpointIfDue(std::int64_t now_ns) {
   }
 }
 
+// What the journal could not take, in a full disk say, is in memory still: the job as it is now, ended or not.
+void JobDesk::WriteDownAgainIfDue(std::int64_t now_ns) {
+  if (!journal_trouble_.empty() && now_ns >= next_writing_ns_) {
+    next_writing_ns_ = After(now_ns, kJournalRetry_s);
+    (void)WriteDown(*active_);
+  }
+}
+
 JobDesk::Outgoing JobDesk::Cycle() {
   const Lock lock(mutex_);
   const std::int64_t now_ns = clock_.now_ns();
@@ -215,9 +224,7 @@ JobDesk::Outgoing JobDesk::Cycle() {
   if (active_) {
     recorder_.Cycle(machine_, active_->progress.state, now_ns);
     CheckpointIfDue(now_ns);
-    if (!journal_trouble_.empty() && !HasEnded(active_->progress.state)) {
-      (void)WriteDown(*active_);
-    }
+    WriteDownAgainIfDue(now_ns);
   }
   changed_.notify_all();
   return {std::exchange(commands_, {}), std::exchange(records_, {})};
@@ -648,11 +655,12 @@ void JobDesk::Admitted(const std::string& job_id, const Admission& admission) {
                               : admission.verdict == kRefused ? Happening::kRefused
                               : admission.verdict == kFailed  ? Happening::kFailed
                                                               : Happening::kNoted;
+  absl::Status written;
   if (happening != Happening::kNoted || job->progress.reason != admission.reason) {
-    (void)Change(std::move(*job), happening, news);
+    written = Change(std::move(*job), happening, news);
   }
-  if (happening == Happening::kNoted) {
-    // Trajectory is away: every other admission would fail too, so this one keeps its place.
+  if (happening == Happening::kNoted || !written.ok()) {
+    // Trajectory is away, or the journal cannot be written: every other admission would fail too, so this one keeps its place.
     admissions_.push_front(job_id);
     WaitFor(lock, kAdmissionRetry_s, [] { return false; });
   }

@@ -152,6 +152,7 @@ class JobDesk {
   void WaitUntilUnloaded(Lock& lock, double patience_s);
   absl::StatusOr<LiveJob> WaitUntilStarted(Lock& lock, const std::string& job_id, double patience_s);
   void CheckpointIfDue(std::int64_t now_ns);
+  void WriteDownAgainIfDue(std::int64_t now_ns);
 
   std::unique_ptr<Journal> journal_;
   const Clock& clock_;
@@ -171,6 +172,7 @@ class JobDesk {
   std::deque<MachineTask> machine_tasks_;
   std::uint64_t last_token_ = 0;
   std::int64_t next_checkpoint_ns_ = 0;
+  std::int64_t next_writing_ns_ = 0;
   std::string journal_trouble_;
 };
 
