@@ -16,8 +16,21 @@ class StageFailed(Exception):
     """The main job cannot go on; the text says why and what to do."""
 
 
+def wait_until_heard(cell):
+    """Whoever serves may still be unknown to the cell; waits until it has heard everyone."""
+    deadline = time.monotonic() + 10
+    lost = ["everyone"]
+    while lost and time.monotonic() < deadline:
+        state = cell.jobs.GetMachineState(cell_pb2.GetMachineStateRequest(), timeout=RPC_TIMEOUT_S).state
+        lost = [f"{node.name} ({node.reason})" for node in state.nodes if node.mode == "LOST"]
+        time.sleep(0.05)
+    if lost:
+        raise StageFailed(f"the cell has not heard {', '.join(lost)} for 10 s")
+
+
 def reference(cell):
     """Resets what is latched and references both modules."""
+    wait_until_heard(cell)
     answer = cell.jobs.ResetMachine(cell_pb2.ResetMachineRequest(), timeout=30)
     deadline = time.monotonic() + 10
     state = answer.state

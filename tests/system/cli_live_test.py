@@ -8,6 +8,7 @@ import sys
 import unittest
 
 import cell_under_test as under_test
+import stages
 
 BUILD = pathlib.Path(sys.argv.pop(1))
 DRAWING = under_test.SOURCE / "deploy" / "parts" / "bracket.drawing.yaml"
@@ -46,7 +47,8 @@ class Lambdajet:
 class EveryVerb(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        cls.processes, _ = cls.enterClassContext(under_test.cell_under_test(BUILD))
+        cls.processes, cell = cls.enterClassContext(under_test.cell_under_test(BUILD))
+        stages.wait_until_heard(cell)
         cls.folder = cls.processes.folder
         shell = Lambdajet(cls("test_accuracy"), cls.folder)
         shell.run("machine", "state", code=WRONG_STATE)  # nothing is referenced yet
