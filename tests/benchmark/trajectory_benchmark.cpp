@@ -8,8 +8,8 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
-#include <numbers>
 #include <string>
+#include <vector>
 
 #include "tests/laws/trajectory_cases.hpp"
 #include "tests/laws/trajectory_spatial_reference.hpp"
@@ -22,8 +22,6 @@
 namespace lambdajet::trajectory {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
-
 template <class Work>
 double Seconds(Work work, int repeats = 3) {
   double best = 1e300;
@@ -33,35 +31,6 @@ double Seconds(Work work, int repeats = 3) {
     best = std::min(best, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
   }
   return best;
-}
-
-void Line(std::string& text, double x, double y) {
-  char line[64];
-  std::snprintf(line, sizeof line, "G1 X%.4f Y%.4f\n", x, y);
-  text += line;
-}
-
-// Round and round on a slowly changing radius.
-std::string CircleOfShortBlocks(int blocks, double radius, double step, double feed_mm_per_min) {
-  std::string text =
-      "G21 G90\nG0 X" + std::to_string(400 + radius) + " Y300\nG1 F" + std::to_string(feed_mm_per_min) + "\n";
-  text.reserve(static_cast<std::size_t>(blocks) * 26);
-  for (int i = 1; i <= blocks; ++i) {
-    const double a = i * step / radius;
-    Line(text, 400 + radius * std::cos(a), 300 + radius * std::sin(a));
-  }
-  return text + "M2\n";
-}
-
-std::string FigureEight(int blocks, double radius, double step, double feed_mm_per_min) {
-  std::string text = "G21 G90\nG0 X400 Y300\nG1 F" + std::to_string(feed_mm_per_min) + "\n";
-  const double lap = 2 * kPi * radius;
-  for (int i = 1; i <= blocks; ++i) {
-    const double s = std::fmod(i * step, 2 * lap);
-    const double side = s < lap ? 1.0 : -1.0, a = std::fmod(s, lap) / radius;
-    Line(text, 400 + side * radius * (1 - std::cos(a)), 300 + radius * std::sin(a));
-  }
-  return text + "M2\n";
 }
 
 // What any reader must do at least: find the line ends and turn the digits into numbers with the C library.
@@ -136,25 +105,15 @@ void Planning(int blocks) {
       planned.faults.size());
 }
 
-double CuttingSpeed(const PlannedProgram& p) {
-  double length = 0.0, time = 0.0;
-  for (std::size_t i = 1; i < p.samples.size(); ++i) {
-    const double s = p.samples[i].s_mm;
-    if (s > 0.05 * p.plan.length_mm && s < 0.95 * p.plan.length_mm) {
-      length += s - p.samples[i - 1].s_mm;
-      time += p.samples[i].tau_s - p.samples[i - 1].tau_s;
-    }
-  }
-  return length / time;
-}
-
-void FeedHeld(const char* name, const std::string& text, double radius) {
+void FeedHeld(const char* name, const std::string& text, const std::vector<Eigen::Vector2d>& centres_mm) {
   const MachineDescription m = DemoLikeMachine();
-  const PlannedProgram p = PlanPartProgram(text, m, {});
-  const double allowed = std::min(100.0, std::sqrt(m.path.acceleration_mm_per_s2 * radius));
+  const double held = MeanSpeed(PlanPartProgram(text, m, {}));
+  const double bound = FastestMeanSpeed(m, 100.0, 20.0, centres_mm);
   std::printf(
-      "%s in 0.02 mm blocks, 100 mm/s programmed: %.1f mm/s, %.1f %% of the %.1f mm/s its limits allow\n",
-      name, CuttingSpeed(p), 100 * CuttingSpeed(p) / allowed, allowed);
+      "%s R20 in 0.02 mm blocks, 100 mm/s programmed: %.1f mm/s, %.1f %% of %.1f mm/s, which feed, curvature "
+      "and actuator "
+      "speeds allow\n",
+      name, held, 100 * held / bound, bound);
 }
 
 void PathTiming() {
@@ -222,62 +181,13 @@ void AgainstBound() {
               p.plan.duration_s, bound, p.plan.duration_s / bound);
 }
 
-// The sheet on its spring behind the played effector: m u'' = -k (u - x) - c (u' - x'), integrated finely.
-double ElasticError(const MachineDescription& truth, const PlannedProgram& p,
-                    const MachineDescription& planned_for) {
-  const double w2 = 1.0 / truth.value(Parameter::kElasticLagS2);
-  const double T = truth.value(Parameter::kDampingTimeS);
-  const auto mechanism = kinematics::LambdaMechanism::FromDescription(planned_for);
-  Eigen::Vector2d r, v = Eigen::Vector2d::Zero(), last;
-  bool begun = false;
-  double sum = 0.0;
-  std::size_t count = 0;
-  constexpr double kStep_s = 1e-4;
-  for (const Segment& s : p.plan.segments) {
-    for (double t = 0.0; t < s.duration_s - 1e-9; t += kStep_s) {
-      const auto at = [&](bool lead) {
-        Eigen::Vector2d q;
-        for (int a = 0; a < 2; ++a) {
-          const auto i = static_cast<std::size_t>(a);
-          q[a] = s.q_mm[i].value(t) + (lead ? s.lead_mm[i].value(t) : 0.0);
-        }
-        return kinematics::SolveForward(mechanism, q).p_DE_mm;
-      };
-      const Eigen::Vector2d x = at(true);
-      if (!begun) {
-        r = last = x;
-        begun = true;
-      }
-      const Eigen::Vector2d x_rate = (x - last) / kStep_s;
-      last = x;
-      v += kStep_s * (-w2 * (r - x) - w2 * T * (v - x_rate));
-      r += kStep_s * v;
-      sum += (r - at(false)).squaredNorm();
-      ++count;
-    }
-  }
-  return std::sqrt(sum / static_cast<double>(count));
-}
-
 void FeedForward() {
-  const std::string text =
-      "G21 G90\nG0 X300 Y200\nM3\nG1 F4800\nG1 X400\nG3 X420 Y220 I0 J20\nG1 Y300\nG2 X440 Y320 I20\nG1 X500 "
-      "Y260\nM5\nM2\n";
-  const MachineDescription m = DemoLikeMachine();
-  const PlannedProgram plain = PlanPartProgram(text, m, {});
-  PlanOptions options;
-  options.compensate = true;
-  const double untreated = ElasticError(m, plain, m);
-  const PlannedProgram exact = PlanPartProgram(text, m, options);
-  MachineDescription wrong = m;
-  wrong.value(Parameter::kElasticLagS2) *= 1.1;
-  const PlannedProgram off = PlanPartProgram(text, wrong, options);
+  const ElasticFigures figures = MeasureFeedForward();
   std::printf(
       "elastic error on the spring-mass plant, rms: untreated %.4f mm; removed %.2f %% with exact "
       "parameters, %.2f %% with "
       "stiffness 10 %% wrong\n",
-      untreated, 100 * (1 - ElasticError(m, exact, m) / untreated),
-      100 * (1 - ElasticError(m, off, m) / untreated));
+      figures.untreated_mm, 100 * figures.removed_exact, 100 * figures.removed_wrong);
 }
 
 }  // namespace
@@ -290,8 +200,8 @@ int main(int count, char** words) {
   PathTiming();
   PathTimingOf<2>();
   PathTimingOf<6>();
-  FeedHeld("circle R20", CircleOfShortBlocks(20000, 20, 0.02, 6000), 20);
-  FeedHeld("figure-eight R20", FigureEight(20000, 20, 0.02, 6000), 20);
+  FeedHeld("circle", CircleOfShortBlocks(20000, 20, 0.02, 6000), {{400, 300}});
+  FeedHeld("figure-eight", FigureEight(20000, 20, 0.02, 6000), {{420, 300}, {380, 300}});
   AgainstBound();
   FeedForward();
   Planning(count > 1 ? std::atoi(words[1]) : 100'000);

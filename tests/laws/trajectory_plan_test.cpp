@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <cstdlib>
 
 #include "kinematics/core/lambda_mechanism.hpp"
@@ -207,6 +208,31 @@ TEST(PlanLaws, SameInputsSamePlan) {
   PlanOptions other;
   other.compensate = true;
   EXPECT_NE(PlanPartProgram(text, m, other).plan.id, a.plan.id);
+}
+
+// Against a speed that no plan can exceed; 1 ms knots, as the loop that plays them.
+TEST(FeedLaw, ShortBlocksHoldTheFeed) {
+  const MachineDescription m = DemoLikeMachine();
+  PlanOptions options;
+  options.knot_s = 0.001;
+  const double circle = MeanSpeed(PlanPartProgram(CircleOfShortBlocks(20000, 20, 0.02, 6000), m, options)) /
+                        FastestMeanSpeed(m, 100.0, 20.0, {{400, 300}});
+  const double eight = MeanSpeed(PlanPartProgram(FigureEight(20000, 20, 0.02, 6000), m, options)) /
+                       FastestMeanSpeed(m, 100.0, 20.0, {{420, 300}, {380, 300}});
+  std::printf("feed held in 0.02 mm blocks: circle %.2f %%, figure-eight %.2f %% of the bound\n",
+              100 * circle, 100 * eight);
+  EXPECT_GE(circle, 0.95);
+  EXPECT_GE(eight, 0.95);
+  EXPECT_LE(circle, 1.0 + 1e-4);
+  EXPECT_LE(eight, 1.0 + 1e-4);
+}
+
+TEST(ElasticLaw, FeedForwardMakesTheSheetFollow) {
+  const ElasticFigures figures = MeasureFeedForward();
+  std::printf("elastic error %.4f mm rms; removed %.2f %%, with stiffness 10 %% wrong %.2f %%\n",
+              figures.untreated_mm, 100 * figures.removed_exact, 100 * figures.removed_wrong);
+  EXPECT_GE(figures.removed_exact, 0.95);
+  EXPECT_GE(figures.removed_wrong, 0.80);
 }
 
 // Resume backs up by the overlap, pierces there, and meets every later event and gate where the whole plan has it.

@@ -6,6 +6,10 @@
 namespace lambdajet::trajectory {
 namespace {
 
+// Of T1: wider, and the contour is left further where curvature jumps; narrower, and the jerk is higher there.
+constexpr double kCorrectionShare = 0.5;
+constexpr double kStanding2_mm2 = 1e-18;  // of way over two samples
+
 int OddWidth(double duration_s, double knot_s) {
   return 2 * static_cast<int>(std::ceil(0.5 * (duration_s / knot_s - 1.0) - 1e-9)) + 1;
 }
@@ -34,18 +38,27 @@ void MovingAverage(const std::vector<PathSample>& in, int width, std::vector<Pat
   }
 }
 
-// Outward correction by half the variance times the normal acceleration.
-void CorrectOutwards(const std::vector<PathSample>& in, double half_variance_samples,
+// Outward correction by half the variance times the normal acceleration, averaged over `width` samples: where curvature
+// jumps, the sharp correction's own jerk would be larger than that of the path.
+void CorrectOutwards(const std::vector<PathSample>& in, double half_variance_samples, int width,
                      std::vector<PathSample>& out) {
-  out = in;
+  std::vector<PathSample>& outward = out;
+  outward.assign(in.size(), PathSample::Zero());
+  std::vector<PathSample> averaged;
   for (std::size_t i = 1; i + 1 < in.size(); ++i) {
     const Eigen::Vector2d along = (in[i + 1] - in[i - 1]).head<2>();
     const double along2 = along.squaredNorm();
-    if (along2 < 1e-18) {
-      continue;
+    if (along2 >= kStanding2_mm2) {
+      const Eigen::Vector2d bend = (in[i + 1] - 2.0 * in[i] + in[i - 1]).head<2>();
+      outward[i].head<2>() = -half_variance_samples * (bend - along * (along.dot(bend) / along2));
     }
-    const Eigen::Vector2d bend = (in[i + 1] - 2.0 * in[i] + in[i - 1]).head<2>();
-    out[i].head<2>() -= half_variance_samples * (bend - along * (along.dot(bend) / along2));
+  }
+  MovingAverage(outward, width, averaged);
+  out = in;
+  for (std::size_t i = 1; i + 1 < in.size(); ++i) {
+    if ((in[i + 1] - in[i - 1]).head<2>().squaredNorm() >= kStanding2_mm2) {  // what stands stays where it is
+      out[i] += averaged[i];
+    }
   }
 }
 
@@ -61,6 +74,7 @@ SmoothingFilter SmoothingFilter::ForLimits(double knot_s, double acceleration_mm
   filter.first_width = std::max(1, OddWidth(t1, knot_s));
   const double t2 = std::max(0.25 * t1, std::sqrt(ramp_s2));
   filter.second_width = std::max(1, OddWidth(t2, knot_s));
+  filter.correction_width = OddWidth(kCorrectionShare * t1, knot_s);
   filter.third_width = ramp_s2 > 0.0 ? std::max(1, OddWidth(ramp_s2 / t2, knot_s)) : 1;
   return filter;
 }
@@ -70,34 +84,46 @@ double SmoothingFilter::variance_s2() const {
   return knot_s * knot_s * ((n1 * n1 - 1.0) / 12.0 + (n2 * n2 - 1.0) / 12.0 + (n3 * n3 - 1.0) / 12.0 + 0.5);
 }
 
-double SmoothingFilter::overshoot() const {
-  // Answer of the corrected kernel to a step, computed as the planner will: y'' of a parabola that begins in the middle.
-  const int n = 4 * reach() + 8;
+namespace {
+
+// The filter's answer, in y, to a motion along x whose y is given: as the planner will make it.
+template <class Shape, class Take>
+void Answer(const SmoothingFilter& filter, Shape y, Take take) {
+  const int reach = filter.reach() + filter.correction_width / 2 + 1;
+  const int n = 4 * reach + 8;
   std::vector<PathSample> in(static_cast<std::size_t>(n), PathSample::Zero());
-  for (int i = n / 2; i < n; ++i) {
-    const double t = (i - n / 2) * knot_s;
-    in[static_cast<std::size_t>(i)].y() = 0.5 * t * t;
-  }
   for (int i = 0; i < n; ++i) {
-    in[static_cast<std::size_t>(i)].x() = 1e6 * i;  // so that y is normal to the path
+    // So fast along x that y is normal to the path.
+    in[static_cast<std::size_t>(i)] = PathSample(1e6 * i, y((i - n / 2) * filter.knot_s), 0.0);
   }
-  const std::vector<PathSample> control = Smooth(*this, in);
+  const std::vector<PathSample> control = Smooth(filter, in);
+  for (int i = n / 2 - reach; i <= n / 2 + reach; ++i) {
+    take(EvaluateKnot(control, static_cast<std::size_t>(i), filter.knot_s));
+  }
+}
+
+}  // namespace
+
+double SmoothingFilter::overshoot() const {
   double peak = 1.0;
-  for (int i = n / 2 - reach() - 2; i < n / 2 + reach() + 2; ++i) {
-    peak = std::max(peak, EvaluateKnot(control, static_cast<std::size_t>(i), knot_s).second.y());
-  }
+  Answer(
+      *this, [](double t) { return t > 0.0 ? 0.5 * t * t : 0.0; },
+      [&peak](const KnotState& k) { peak = std::max(peak, k.second.y()); });
   return peak;
 }
 
 double SmoothingFilter::kink_deviation_s() const {
-  // Half of the mean absolute time of the kernel, less the outward correction; close to 0.2 sigma for smooth kernels.
-  const double sigma = std::sqrt(variance_s2());
-  return 0.25 * sigma;
+  double nearest = 1e300;  // the corner lies at y = 0
+  Answer(
+      *this, [](double t) { return 0.5 * std::abs(t); },
+      [&nearest](const KnotState& k) { nearest = std::min(nearest, k.r.y()); });
+  return nearest;
 }
 
 std::vector<PathSample> Smooth(const SmoothingFilter& filter, const std::vector<PathSample>& samples) {
   std::vector<PathSample> a, b;
-  CorrectOutwards(samples, 0.5 * filter.variance_s2() / (filter.knot_s * filter.knot_s), a);
+  CorrectOutwards(samples, 0.5 * filter.variance_s2() / (filter.knot_s * filter.knot_s),
+                  filter.correction_width, a);
   MovingAverage(a, filter.first_width, b);
   MovingAverage(b, filter.second_width, a);
   if (filter.third_width == 1) {

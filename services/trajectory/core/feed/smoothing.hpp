@@ -3,8 +3,9 @@
 // Model: symmetric moving averages of T1, T2 and T3 over samples a knot apart, then a uniform quintic B-spline with the averaged
 // samples as control points: the motion is four times continuously differentiable, and every average keeps what is convex
 // (speed, magnitude of acceleration). An average pulls an arc inwards by sigma^2/2 of its normal acceleration, sigma^2 the
-// kernel's variance; that much is added outwards first (only along the normal, so that path length stays monotone).
-// What is left is of fourth order on arcs, and shows at kinks and junctions; the planner measures it.
+// kernel's variance; that much is added outwards first (only along the normal, so that path length stays monotone), itself
+// averaged over half of T1, so that where curvature jumps the correction adds next to no jerk. What is left is of fourth
+// order on arcs, and shows at kinks and junctions; the planner measures it.
 // Units: mm, s. Shapes: samples one a knot, `reach()` samples of rest before and after. Threads: values.
 #pragma once
 
@@ -21,6 +22,7 @@ struct SmoothingFilter {
   int first_width = 1;  // samples, odd
   int second_width = 1;
   int third_width = 1;
+  int correction_width = 1;  // of the outward correction's own average
 
   // Wide enough for the path's jerk limit; with `ramp_s2` above 0 so that T2 T3 is at least that: a jump of jerk then becomes
   // a fifth derivative of at most the jump over ramp_s2.
@@ -34,7 +36,7 @@ struct SmoothingFilter {
   double half_support_s() const { return (reach() + 0.5) * knot_s; }
   // Peak of the answer to a unit step in normal acceleration; above 1 because of the outward correction.
   double overshoot() const;
-  // Largest distance from a right-angled kink crossed at 1 mm/s velocity change, in s.
+  // Distance of the path from a kink crossed with a change of velocity of 1 mm/s, in s.
   double kink_deviation_s() const;
 };
 

@@ -16,10 +16,12 @@ constexpr double kPathMargin = 0.995;  // planned against the limit, before smoo
 constexpr double kActuatorMargin = 0.97;
 constexpr int kMostPasses = 80;
 constexpr int kChecksPerSegment = 16;
-constexpr double kAllowed = 1.0 + 5e-7;     // of a limit, on the final polynomials
-constexpr double kStrongestSlowDown = 0.6;  // in one pass
-constexpr double kToleranceShare = 0.97;    // measured at knots, held between them
-constexpr double kCornerCosine = 0.95;      // kinks above 0.32 rad are corners
+constexpr double kAllowed = 1.0 + 5e-7;       // of a limit, on the final polynomials
+constexpr double kStrongestSlowDown = 0.6;    // in one pass
+constexpr int kContourChecks = 8;             // a segment
+constexpr double kToleranceShare = 0.98;      // measured at these, held between them
+constexpr double kPlayedMargin = 1.0 + 1e-5;  // the actuators' quintics make the jet's, nearly
+constexpr double kCornerCosine = 0.995;       // kinks above 0.1 rad are corners
 constexpr double kCornerLook_mm = 2.0;
 constexpr double kSmallestDamping_s = 2e-5;
 constexpr double kLeastEase = 0.6;
@@ -59,6 +61,56 @@ Polynomial Hermite(const End& a, const End& b, double T) {
   const double T3 = T * T * T;
   return {{a.value, a.first, 0.5 * a.second, (10 * h - 4 * g + 0.5 * m) / T3,
            (-15 * h + 7 * g - m) / (T3 * T), (6 * h - 3 * g + 0.5 * m) / (T3 * T * T)}};
+}
+
+// What a segment makes the jet do on the sheet: the quintic that meets the smoothed motion at the segment's ends, as the
+// actuators' own do.
+struct PlayedPath {
+  Polynomial x, y;
+
+  Vector2d value(double t) const { return {x.value(t), y.value(t)}; }
+  Vector2d first(double t) const { return {x.first(t), y.first(t)}; }
+  Vector2d second(double t) const { return {x.second(t), y.second(t)}; }
+  Vector2d third(double t) const { return {x.third(t), y.third(t)}; }
+};
+
+double Fourth(const Polynomial& p, double t) { return 120 * p.c[5] * t + 24 * p.c[4]; }
+
+// Bounds of the magnitude of three derivatives on [0, T]: values a step apart, and by how much they can rise between.
+struct Largest {
+  double first = 0.0;
+  double second = 0.0;
+  double third = 0.0;
+
+  Largest(const Polynomial& p, double T) {
+    const double h = T / kChecksPerSegment;
+    for (int k = 0; k <= kChecksPerSegment; ++k) {
+      first = std::max(first, std::abs(p.first(h * k)));
+      second = std::max(second, std::abs(p.second(h * k)));
+    }
+    third = std::max(std::abs(p.third(0.0)), std::abs(p.third(T)));
+    const double turn = p.c[5] == 0.0 ? -1.0 : -p.c[4] / (5.0 * p.c[5]);
+    third = turn > 0.0 && turn < T ? std::max(third, std::abs(p.third(turn))) : third;
+    first += h * h / 8 * third;
+    second += h * h / 8 * std::max(std::abs(Fourth(p, 0.0)), std::abs(Fourth(p, T)));
+  }
+
+  // Of the path: magnitudes of vectors.
+  Largest(const PlayedPath& p, double T) {
+    const double h = T / kChecksPerSegment;
+    for (int k = 0; k <= kChecksPerSegment; ++k) {
+      second = std::max(second, p.second(h * k).norm());
+      third = std::max(third, p.third(h * k).norm());
+    }
+    second += h * h / 8 *
+              std::max(Vector2d(Fourth(p.x, 0.0), Fourth(p.y, 0.0)).norm(),
+                       Vector2d(Fourth(p.x, T), Fourth(p.y, T)).norm());
+    third += h * h / 8 * 120 * Vector2d(p.x.c[5], p.y.c[5]).norm();
+  }
+};
+
+End EndOf(const KnotState& k, int coordinate) {
+  return {k.r[coordinate], k.first[coordinate], k.second[coordinate]};
 }
 
 // Everything at one knot that segments are made of.
@@ -385,22 +437,19 @@ class StretchPlanner {
     const auto per_segment = static_cast<std::size_t>(model_.options.knots_per_segment);
     const double duration = knot_ * static_cast<double>(per_segment);
     plan_.segments.reserve(segment_count_);
-    knots_.clear();
-    knots_.reserve(segment_count_ * per_segment + 1);
+    played_.clear();
+    played_.reserve(segment_count_);
     Lead lead(model_.elastic_lag_s2, model_.damping_time_s, knot_);
     KnotState state = EvaluateKnot(control_, first_, knot_);
     KnotActuators from = ActuatorsAt(state, lead.At(state));
-    End s_from{state.r.z(), state.first.z(), state.second.z()};
-    knots_.push_back(state);
+    KnotState state_from = state;
     for (std::size_t n = 0; n < segment_count_ && plan_.faults.empty(); ++n) {
       for (std::size_t j = 1; j <= per_segment; ++j) {
         const KnotState next = EvaluateKnot(control_, first_ + n * per_segment + j, knot_);
         lead.Advance(state, next);
         state = next;
-        knots_.push_back(state);
       }
       const KnotActuators to = ActuatorsAt(state, lead.At(state));
-      const End s_to{state.r.z(), state.first.z(), state.second.z()};
       Segment segment;
       segment.start_s = duration * static_cast<double>(n);
       segment.duration_s = duration;
@@ -408,10 +457,12 @@ class StretchPlanner {
         segment.q_mm[a] = Hermite(from.q[a], to.q[a], duration);
         segment.lead_mm[a] = Hermite(from.lead[a], to.lead[a], duration);
       }
-      segment.s_mm = Hermite(s_from, s_to, duration);
+      segment.s_mm = Hermite(EndOf(state_from, 2), EndOf(state, 2), duration);
       plan_.segments.push_back(segment);
+      played_.push_back({Hermite(EndOf(state_from, 0), EndOf(state, 0), duration),
+                         Hermite(EndOf(state_from, 1), EndOf(state, 1), duration)});
       from = to;
-      s_from = s_to;
+      state_from = state;
     }
     plan_.duration_s = duration * static_cast<double>(segment_count_);
   }
@@ -469,16 +520,20 @@ class StretchPlanner {
     run_at_ = piece_at_ = 0;
     pending_slow_.clear();
     FindCorners();
+    const double duration = knot_ * static_cast<double>(per_segment);
     for (std::size_t n = 0; n < segment_count_; ++n) {
-      Excess excess = SegmentExcess(plan_.segments[n]);
-      for (std::size_t j = 0; j < per_segment; ++j) {
-        KnotExcess(knots_[n * per_segment + j], excess);
-        NearCorners(n * per_segment + j);
+      const double begin =
+          (static_cast<double>(n * per_segment + first_) - static_cast<double>(pad_)) * knot_;
+      Excess excess = SegmentExcess(n);
+      for (int k = 0; k < kContourChecks; ++k) {
+        const double from = duration * k / kContourChecks, to = duration * (k + 1) / kContourChecks;
+        const double s = plan_.segments[n].s_mm.value(from);
+        const Vector2d p = played_[n].value(from);
+        ContourExcess(p, s, excess);
+        NearCorners(s, p, played_[n].value(to), begin + from);
       }
       if (excess.slow < 1.0) {
-        const double begin =
-            (static_cast<double>(n * per_segment + first_) - static_cast<double>(pad_)) * knot_;
-        pending_slow_.push_back({begin, begin + knot_ * static_cast<double>(per_segment), excess});
+        pending_slow_.push_back({begin, begin + duration, excess});
       }
     }
     MissedCorners();
@@ -516,20 +571,18 @@ class StretchPlanner {
     }
   }
 
-  void NearCorners(std::size_t knot) {
-    const double s = knots_[knot].r.z();
+  void NearCorners(double s, const Vector2d& a, const Vector2d& b, double time_s) {
     while (corner_at_ < corners_.size() && corners_[corner_at_].s_mm < s - kCornerLook_mm) {
       ++corner_at_;
     }
-    const Vector2d a = knots_[knot].r.head<2>();
-    const Vector2d d = knots_[knot + 1].r.head<2>() - a;
+    const Vector2d d = b - a;
     for (std::size_t i = corner_at_; i < corners_.size() && corners_[i].s_mm <= s + kCornerLook_mm; ++i) {
       const Vector2d r = corners_[i].p_mm - a;
       const double share = d.squaredNorm() > 0.0 ? std::clamp(r.dot(d) / d.squaredNorm(), 0.0, 1.0) : 0.0;
       const double distance = (r - share * d).norm();
       if (distance < corners_[i].nearest_mm) {
         corners_[i].nearest_mm = distance;
-        corners_[i].time_s = (static_cast<double>(knot + first_) - static_cast<double>(pad_)) * knot_;
+        corners_[i].time_s = time_s;
       }
     }
   }
@@ -547,23 +600,27 @@ class StretchPlanner {
               [](const PendingSlow& a, const PendingSlow& b) { return a.begin_time_s < b.begin_time_s; });
   }
 
-  Excess SegmentExcess(const Segment& segment) const {
+  Excess SegmentExcess(std::size_t n) const {
     Excess excess;
+    const Segment& segment = plan_.segments[n];
     for (std::size_t a = 0; a < 2; ++a) {
       const ActuatorLimits& limit = model_.machine.actuators[a];
       Polynomial p = segment.q_mm[a];
       for (std::size_t c = 0; c < p.c.size(); ++c) {
         p.c[c] += segment.lead_mm[a].c[c];
       }
-      for (int k = 0; k <= kChecksPerSegment; ++k) {
-        const double t = segment.duration_s * k / kChecksPerSegment;
-        Judge(std::abs(p.first(t)) / limit.velocity_mm_per_s, 1.0,
-              a == 0 ? FeedLimit::kActuator1Velocity : FeedLimit::kActuator2Velocity, excess);
-        Judge(std::abs(p.second(t)) / limit.acceleration_mm_per_s2, 0.5,
-              a == 0 ? FeedLimit::kActuator1Acceleration : FeedLimit::kActuator2Acceleration, excess);
-        Judge(std::abs(p.third(t)) / limit.jerk_mm_per_s3, 1.0 / 3.0, FeedLimit::kActuatorJerk, excess);
-      }
+      const Largest largest(p, segment.duration_s);
+      Judge(largest.first / limit.velocity_mm_per_s, 1.0,
+            a == 0 ? FeedLimit::kActuator1Velocity : FeedLimit::kActuator2Velocity, excess);
+      Judge(largest.second / limit.acceleration_mm_per_s2, 0.5,
+            a == 0 ? FeedLimit::kActuator1Acceleration : FeedLimit::kActuator2Acceleration, excess);
+      Judge(largest.third / limit.jerk_mm_per_s3, 1.0 / 3.0, FeedLimit::kActuatorJerk, excess);
     }
+    const PathLimits& path = model_.machine.path;
+    const Largest largest(played_[n], segment.duration_s);
+    Judge(kPlayedMargin * largest.second / path.acceleration_mm_per_s2, 0.5, FeedLimit::kPathAcceleration,
+          excess);
+    Judge(kPlayedMargin * largest.third / path.jerk_mm_per_s3, 1.0 / 3.0, FeedLimit::kPathJerk, excess);
     return excess;
   }
 
@@ -573,12 +630,9 @@ class StretchPlanner {
     }
   }
 
-  void KnotExcess(const KnotState& k, Excess& excess) {
-    const PathLimits& path = model_.machine.path;
-    Judge(k.second.head<2>().norm() / path.acceleration_mm_per_s2, 0.5, FeedLimit::kPathAcceleration, excess);
-    Judge(k.third.head<2>().norm() / path.jerk_mm_per_s3, 1.0 / 3.0, FeedLimit::kPathJerk, excess);
+  void ContourExcess(const Vector2d& p, double s, Excess& excess) {
     double tolerance;
-    const double deviation = Deviation(k, tolerance);
+    const double deviation = Deviation(p, s, tolerance);
     if (deviation >= 0.0) {
       plan_.contour_deviation_mm = std::max(plan_.contour_deviation_mm, deviation);
       Judge(deviation / (kToleranceShare * tolerance), 0.6, FeedLimit::kContourTolerance, excess);
@@ -586,8 +640,7 @@ class StretchPlanner {
   }
 
   // Distance of the planned point from the programmed contour; negative outside of runs.
-  double Deviation(const KnotState& k, double& tolerance) {
-    const double s = k.r.z();
+  double Deviation(const Vector2d& p, double s, double& tolerance) {
     while (run_at_ < elements_.size() && (elements_[run_at_].kind != ElementKind::kRun ||
                                           planned_[run_at_].begin_s_mm + planned_[run_at_].length_mm < s)) {
       ++run_at_;
@@ -601,7 +654,6 @@ class StretchPlanner {
     while (piece_at_ + 1 < pieces.size() && pieces[piece_at_ + 1].begin_mm <= offset) {
       ++piece_at_;
     }
-    const Vector2d p = k.r.head<2>();
     tolerance = pieces[piece_at_].tolerance_mm;
     double distance = DistanceTo(pieces[piece_at_], p);
     if (distance > 0.02 * tolerance) {
@@ -765,16 +817,19 @@ class StretchPlanner {
   void ReportSamples() {
     const auto every = static_cast<std::size_t>(std::max(1.0, std::round(model_.options.sample_s / knot_)));
     std::size_t element = 0;
-    for (std::size_t n = 0; n < knots_.size(); n += every) {
-      const KnotState& k = knots_[n];
+    const auto per_segment = static_cast<std::size_t>(model_.options.knots_per_segment);
+    for (std::size_t n = 0; n <= segment_count_ * per_segment; n += every) {
+      const std::size_t i = std::min(n / per_segment, segment_count_ - 1);
+      const double t = static_cast<double>(n - i * per_segment) * knot_;
+      const Vector2d p = played_[i].value(t), v = played_[i].first(t), a = played_[i].second(t);
       PlanSample sample{static_cast<double>(n) * knot_,
-                        k.r.z(),
-                        k.r.x(),
-                        k.r.y(),
-                        k.first.x(),
-                        k.first.y(),
-                        k.second.x(),
-                        k.second.y(),
+                        plan_.segments[i].s_mm.value(t),
+                        p.x(),
+                        p.y(),
+                        v.x(),
+                        v.y(),
+                        a.x(),
+                        a.y(),
                         false,
                         0};
       while (element + 1 < elements_.size() &&
@@ -805,7 +860,7 @@ class StretchPlanner {
   std::size_t segment_count_ = 0;
   std::vector<PathSample> samples_;
   std::vector<PathSample> control_;
-  std::vector<KnotState> knots_;
+  std::vector<PlayedPath> played_;
   std::vector<PendingSlow> pending_slow_;
   std::vector<Corner> corners_;
   std::size_t corner_at_ = 0;
