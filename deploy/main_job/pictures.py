@@ -57,7 +57,7 @@ def part(name, deviations, holes, magnification, full_mm):
     ys = [p[1] for line in outlines.values() for p in line]
     width, margin = 760, 60
     scale = (width - 2 * margin) / max(1e-9, max(max(xs) - min(xs), (max(ys) - min(ys)) * 1.2))
-    height = (max(ys) - min(ys)) * scale + 2 * margin + 40
+    height = (max(ys) - min(ys)) * scale + 2 * margin + 20
 
     def at(x, y):
         return margin + (x - min(xs)) * scale, height - margin - (y - min(ys)) * scale
@@ -222,5 +222,9 @@ def histogram(title, values_mm, limits):
     for i in range(int(edge / step) + 1):
         body.append(_text(left + plot_width * i * step / edge, height - bottom + 16, f"{i * step:g}", 11, anchor="middle"))
     body.append(_text(width - 20, height - 8, "|deviation| along the path, µm", 11, anchor="end"))
-    body.append(_text(8, 54, f"highest bar: {tall}", 11))
+    step = max(1, nice_step(tall, 4))
+    for i in range(int(tall / step) + 1):
+        y = height - bottom - plot_height * i * step / tall
+        body.append(_text(left - 6, y + 4, f"{i * step:g}", 11, anchor="end"))
+    body.append(_text(8, 40, "events", 11))
     return _svg(width, height, body)

@@ -2,6 +2,7 @@
 
 import html
 import json
+import math
 
 import yaml
 
@@ -65,6 +66,14 @@ class Stage:
                 for f in self.found.features
             ],
         }
+
+
+def with_sigma(value, sigma):
+    """A value with as many digits as its uncertainty allows: two of sigma's."""
+    if sigma <= 0:
+        return f"{value:g}"
+    digits = max(0, 1 - math.floor(math.log10(sigma)))
+    return f"{value:.{digits}f} ± {sigma:.{digits}f}"
 
 
 def as_json(run):
@@ -182,12 +191,16 @@ def as_html(run, drawn):
         )
         for f in (stage.figures() for stage in run.stages)
     )
+    found = [p for p in run.identification.get("parameters", []) if p["after_sigma"] > 0]
+    held = [p["name"] for p in run.identification.get("parameters", []) if p["after_sigma"] <= 0]
     parameters = "".join(
-        "<tr><td>{}</td><td>{:.6g} ± {:.2g}</td><td>{:.6g} ± {:.2g}</td><td>{:+.3g}</td><td>{}</td></tr>".format(
-            html.escape(p["name"]), p["before"], p["before_sigma"], p["after"], p["after_sigma"], p["after"] - p["before"], html.escape(p["unit"])
+        "<tr><td>{}</td><td>{}</td><td>{}</td><td>{:+.3g}</td><td>{}</td></tr>".format(
+            html.escape(p["name"]), with_sigma(p["before"], p["before_sigma"]), with_sigma(p["after"], p["after_sigma"]),
+            p["after"] - p["before"], html.escape(p["unit"])
         )
-        for p in run.identification.get("parameters", [])
+        for p in found
     )
+    held_words = f"<p>Held as designed: {html.escape(', '.join(held))}.</p>" if held else ""
     features = "".join(
         "<tr><td>{}</td>{}</tr>".format(
             html.escape(run.stages[0].found.features[i].name),
@@ -210,9 +223,10 @@ edge from the drawing along the outline's normal, without any fit. The predicted
 <table><tr><th>feature</th>{"".join(f"<th>{html.escape(s.name)}</th>" for s in run.stages)}</tr>{features}</table>
 <h2>Where the error comes from</h2>{figures["budget"]}
 <h2>Identification</h2>
-<p>{html.escape(run.verification.get("message", ""))}</p>
+<p>Before the first cut, verification said {html.escape(run.verification.get("verdict", ""))}:
+{html.escape(run.verification.get("message", ""))}.</p>
 <p>{html.escape(run.identification.get("words", ""))}</p>
-<table><tr><th>parameter</th><th>before</th><th>identified</th><th>change</th><th>unit</th></tr>{parameters}</table>
+<table><tr><th>parameter</th><th>before</th><th>identified</th><th>change</th><th>unit</th></tr>{parameters}</table>{held_words}
 <h2>Sliders</h2>{figures["slider_positions"]}{figures["slider_speeds"]}
 <h2>Process events</h2>{figures["events"]}
 <pre>{html.escape(table(run))}</pre>
