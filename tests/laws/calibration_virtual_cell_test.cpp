@@ -138,8 +138,45 @@ class OnTheVirtualCell : public testing::Test {
     return j;
   }
 
+  Verification Verify(tests::VirtualCell& cell, const MachineDescription& machine, const char* when) {
+    const auto plan = PlanVerification(machine);
+    EXPECT_EQ(plan.reason, PlanReason::kPlanned) << plan.explanation;
+    const Verification found = VerifyBase(machine, Play(cell, plan.program, machine));
+    std::printf("%s: %s, %s\n", when, std::string(VerdictName(found.verdict)).c_str(),
+                found.explanation.c_str());
+    return found;
+  }
+
   MachineDescription machine_;
 };
+
+TEST_F(OnTheVirtualCell, TheBaseIsVerifiedWithSoftLeversThatSwing) {
+  const auto shipped = simulated_plant::ReadPlantFile(Source() + "/deploy/plants/shipped.yaml");
+  ASSERT_TRUE(shipped.ok()) << shipped.status();
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    PlantTruth truth = seed == 1 ? *shipped : simulated_plant::RandomPlant(machine_, seed);
+    tests::CellOptions options;
+    options.seed = seed;
+    tests::VirtualCell cell(machine_, truth, options);
+    // As the crew left it nothing is known well enough; but nothing contradicts what is known either.
+    const Verification as_set_up = Verify(cell, machine_, "as set up");
+    EXPECT_EQ(as_set_up.verdict, Verdict::kUncertain);
+    EXPECT_GE(as_set_up.p_value, 1e-3);
+    const auto found = Identify(machine_, Play(cell, PlanMeasuringRun(machine_).program, machine_));
+    ASSERT_EQ(found.reason, IdentificationReason::kIdentified) << found.explanation;
+    MachineDescription identified = machine_;
+    identified.parameters = found.parameters;
+    identified.covariance = found.covariance;
+    identified.version = 1;
+    cell.AdoptMachine(identified);
+    const Verification standing = Verify(cell, identified, "identified");
+    EXPECT_EQ(standing.verdict, Verdict::kPass);
+
+    truth.X_DH.x_mm += 0.1;
+    tests::VirtualCell moved(identified, truth, options);
+    EXPECT_EQ(Verify(moved, identified, "moved by 100 um").verdict, Verdict::kMoved);
+  }
+}
 
 TEST_F(OnTheVirtualCell, TheShippedPlantIsFound) {
   const auto truth = simulated_plant::ReadPlantFile(Source() + "/deploy/plants/shipped.yaml");

@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
+#include <Eigen/QR>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -14,20 +15,116 @@ namespace lambdajet::calibration {
 namespace {
 
 constexpr std::size_t kMostLooks = 600;  // of which a dense covariance is made
+constexpr double kFree = 1e3;            // prior sigmas that what only swings may differ by
+constexpr int kSwingSteps = 6;
+constexpr double kMostStep = 2.0;  // prior sigmas
+constexpr int kPlaceSize = 2;      // of a tracking run's unknowns the first, its place; the others swing
 
 // Everything whitened by the looks' own noise.
 struct Innovation {
   Eigen::VectorXd r;           // seen minus predicted
   Eigen::MatrixXd covariance;  // S: noise, parameters, marks and tracking runs
   Eigen::MatrixXd move;        // A: of the looks by shift of the module and turn of the sheet
+  Eigen::Index free = 0;       // readings that what only swings takes up
   double reach_mm = 0.0;       // of the marks looked at from their middle
 };
+
+// A tracking run's unknowns that say nothing of where it looked: its swing, and the elasticity behind it.
+Eigen::MatrixXd SwingColumns(const LookSystem& system, std::size_t first, std::size_t end) {
+  Eigen::MatrixXd J(static_cast<Eigen::Index>(2 * (end - first)), kRunSize - kPlaceSize + 2);
+  for (std::size_t i = first; i < end; ++i) {
+    const LookRow& row = system.row(i);
+    J.middleRows<2>(static_cast<Eigen::Index>(2 * (i - first)))
+        << row.J_run.rightCols<kRunSize - kPlaceSize>(),
+        row.J_z.col(At(Parameter::kElasticLagS2)), row.J_z.col(At(Parameter::kDampingTimeS));
+  }
+  return J;
+}
+
+// Moves the unknowns of swing and elasticity to what the pictures say, by Gauss-Newton with each run's place beside them, so that
+// what follows is linear about the swing that was seen, not about the one expected. False if the system cannot be evaluated.
+bool FollowSwing(LookSystem& system, LookUnknowns& at) {
+  constexpr int kSwing = kRunSize - kPlaceSize;
+  const auto shared = kRunSize * static_cast<Eigen::Index>(system.run_count());
+  for (int step = 0; step < kSwingSteps; ++step) {
+    system.Relinearise(at.z);
+    if (!system.Evaluate(at)) {
+      return false;
+    }
+    Eigen::MatrixXd J = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(2 * system.look_count()), shared + 2);
+    Eigen::VectorXd r = Eigen::VectorXd::Zero(J.rows());
+    for (std::size_t i = 0; i < system.look_count(); ++i) {
+      const LookRow& row = system.row(i);
+      const auto k = static_cast<Eigen::Index>(2 * i);
+      if (const int run = system.run_of(i); run >= 0) {
+        J.block<2, kRunSize>(k, kRunSize * run) = row.J_run;
+        J.block<2, 2>(k, shared) << row.J_z.col(At(Parameter::kElasticLagS2)),
+            row.J_z.col(At(Parameter::kDampingTimeS));
+        r.segment<2>(k) = -row.residual;
+      }
+    }
+    const Eigen::VectorXd change =
+        J.completeOrthogonalDecomposition().solve(r).cwiseMax(-kMostStep).cwiseMin(kMostStep);
+    at.z[At(Parameter::kElasticLagS2)] += change[shared];
+    at.z[At(Parameter::kDampingTimeS)] += change[shared + 1];
+    for (std::size_t run = 0; run < system.run_count(); ++run) {
+      at.runs[run].tail<kSwing>() +=
+          change.segment<kSwing>(kRunSize * static_cast<Eigen::Index>(run) + kPlaceSize);
+    }
+  }
+  system.Relinearise(at.z);
+  return system.Evaluate(at);
+}
+
+// Mean square, per reading, of what is left of the tracking runs when each is fitted by itself with place and swing; at least
+// 1. It is what the spring-mass model, linear about this version, does not know of the swing.
+double TrackingNoise(const LookSystem& system) {
+  double squared = 0.0;
+  Eigen::Index freedom = 0;
+  for (std::size_t first = 0, end = 0; first < system.look_count(); first = end) {
+    end = first + 1;
+    while (end < system.look_count() && system.run_of(end) == system.run_of(first)) {
+      ++end;
+    }
+    if (system.run_of(first) < 0) {
+      continue;
+    }
+    const Eigen::MatrixXd swing = SwingColumns(system, first, end);
+    Eigen::MatrixXd J(swing.rows(), swing.cols() + kPlaceSize);
+    Eigen::VectorXd r(swing.rows());
+    J.rightCols(swing.cols()) = swing;
+    for (std::size_t i = first; i < end; ++i) {
+      const auto at = static_cast<Eigen::Index>(2 * (i - first));
+      J.block<2, kPlaceSize>(at, 0) = system.row(i).J_run.leftCols<kPlaceSize>();
+      r.segment<2>(at) = system.row(i).residual;
+    }
+    const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> fit(J);
+    squared += (r - J * fit.solve(r)).squaredNorm();
+    freedom += J.rows() - fit.rank();
+  }
+  return freedom > 0 ? std::max(1.0, squared / static_cast<double>(freedom)) : 1.0;
+}
+
+// How soft the levers are is identification's to say; here it may be whatever the pictures say.
+void FreeTheSwing(const LookSystem& system, Eigen::MatrixXd& J, Innovation& line) {
+  if (system.run_count() == 0) {
+    return;
+  }
+  J.col(At(Parameter::kElasticLagS2)) *= kFree;
+  J.col(At(Parameter::kDampingTimeS)) *= kFree;
+  const auto swings = kRunSize - kPlaceSize;
+  for (std::size_t run = 0; run < system.run_count(); ++run) {
+    const auto at = J.cols() - kRunSize * static_cast<Eigen::Index>(system.run_count() - run) + kPlaceSize;
+    J.middleCols(at, swings) *= kFree;
+  }
+  line.free = 2 + swings * static_cast<Eigen::Index>(system.run_count());
+}
 
 Innovation Line(const LookSystem& system) {
   const auto n = static_cast<Eigen::Index>(2 * system.look_count());
   const auto marks = static_cast<Eigen::Index>(kMarkSize * system.mark_count());
   const auto runs = static_cast<Eigen::Index>(kRunSize * system.run_count());
-  Innovation line{Eigen::VectorXd::Zero(n), {}, Eigen::MatrixXd::Zero(n, 3), 0.0};
+  Innovation line{Eigen::VectorXd::Zero(n), {}, Eigen::MatrixXd::Zero(n, 3)};
   Eigen::MatrixXd J = Eigen::MatrixXd::Zero(n, kAll + marks + runs);  // to all that is N(0, I)
   Eigen::Vector2d middle = Eigen::Vector2d::Zero();
   for (std::size_t i = 0; i < system.look_count(); ++i) {
@@ -53,6 +150,7 @@ Innovation Line(const LookSystem& system) {
     line.reach_mm =
         std::max(line.reach_mm, (*MarkPlace(system.machine(), system.look(i).mark) - middle).norm());
   }
+  FreeTheSwing(system, J, line);
   line.covariance = Eigen::MatrixXd::Identity(n, n) + J * J.transpose();
   return line;
 }
@@ -63,7 +161,7 @@ void Estimate(const Innovation& line, Verification& found) {
   const Eigen::MatrixXd whitened_A = root.matrixL().solve(line.move);
   const Eigen::Matrix3d normal = whitened_A.transpose() * whitened_A;
   found.chi_square = whitened_r.squaredNorm();
-  found.degrees_of_freedom = static_cast<std::size_t>(line.r.size());
+  found.degrees_of_freedom = static_cast<std::size_t>(line.r.size() - line.free);
   found.p_value = ChiSquareUpperTail(found.chi_square, static_cast<double>(found.degrees_of_freedom));
   found.move_covariance = normal.llt().solve(Eigen::Matrix3d::Identity());
   found.move = found.move_covariance * (whitened_A.transpose() * whitened_r);
@@ -135,6 +233,16 @@ Verification VerifyBase(const MachineDescription& machine, const std::vector<Mea
         std::to_string(looks.size()) + " usable looks; at least 2 of different marks are needed";
     return found;
   }
+  LookUnknowns at = look_system.Start();
+  if (!FollowSwing(look_system, at)) {  // as the version says, then
+    at = look_system.Start();
+    look_system.Relinearise(at.z);
+    (void)look_system.Evaluate(at);
+  }
+  found.tracking_noise_ratio = TrackingNoise(look_system);
+  look_system.SetTrackingNoise(found.tracking_noise_ratio);
+  look_system.Relinearise(at.z);
+  (void)look_system.Evaluate(at);  // evaluated a moment ago with other weights
   const Innovation line = Line(look_system);
   Estimate(line, found);
   const double n = static_cast<double>(looks.size());

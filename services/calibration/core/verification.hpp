@@ -5,6 +5,9 @@
 // turned against it about the middle of the marks looked at. Its generalised least-squares estimate and covariance (A^T
 // S^-1 A)^-1 say by how much, and r^T S^-1 r falls by the estimate's own chi-square of three degrees of freedom. A turn of
 // the module about its own camera moves no mark that stands in the middle of the picture: only a trial hole shows it.
+// How the sheet swung while it was looked at is no part of the question: elasticity and swing are first moved to what the
+// pictures say (Gauss-Newton) and then left free, and the pictures count for as noisy as they are about that swing, never
+// for better than stated.
 //     MOVED      the move is significant (chance below `false_alarm`) and displaces the sheet under the jet by more than
 //                `tolerance_mm` somewhere among the marks looked at
 //     UNCERTAIN  the version is known too coarsely to tell a move of `tolerance_mm`; or the looks contradict it in a way
@@ -51,6 +54,8 @@ struct Verification {
   double remainder_p_value = 1.0;                             // of what the move leaves
   Eigen::Vector2d mean_shift_C_mm = Eigen::Vector2d::Zero();  // seen minus predicted, mean over the looks
   double rms_mm = 0.0;
+  double tracking_noise_ratio =
+      1.0;  // variance of tracking pictures against the stated one, as found and then used
 };
 
 // Uses the looks at marks, still and tracking; the machine's own parameters and covariance are the version compared with.
