@@ -1,3 +1,3 @@
 lambdajet_check(modules_path_clock_test LABELS laws SOURCES modules_path_clock_test.cpp DEPS drive_core)
 lambdajet_check(modules_virtual_cell_laws_test LABELS laws SOURCES modules_virtual_cell_laws_test.cpp
-  DEPS virtual_cell platform_machine_file)
+  DEPS virtual_cell platform_machine_file trajectory_core)

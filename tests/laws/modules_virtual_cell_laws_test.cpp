@@ -3,14 +3,20 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <optional>
 #include <random>
+#include <string>
 #include <vector>
 
 #include "simulated_plant/core/nominal_plant.hpp"
 #include "tests/support/demo_machine.hpp"
 #include "tests/support/hand_made_plan.hpp"
 #include "tests/support/virtual_cell.hpp"
+#include "trajectory/core/feed/plan_program.hpp"
 
 namespace lambdajet::tests {
 namespace {
@@ -195,6 +201,94 @@ TEST(PathLaw, ContourKeepsItsShapeUnderHoldsOverridesAndRetraces) {
   std::printf(
       "contour under random holds, overrides and retraces, 32 seeds: at most %.1e mm beside the curve\n",
       worst_of_all_mm);
+}
+
+// Held anywhere, backed up, sent on again, some times a run: every millimetre between pierce and jet-off is cut after all,
+// and never while the path runs backwards.
+TEST(ReplayLaw, WhatIsRetracedIsCutAfterAll) {
+  const MachineDescription machine = DemoMachine();
+  const Plan plan = TwoCircles(machine);
+  constexpr double kBin_mm = 0.5;
+  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+    SCOPED_TRACE(seed);
+    Dice dice(seed);
+    CellOptions options;
+    options.seed = seed;
+    VirtualCell cell(machine, simulated_plant::NominalPlant(machine), options);
+    cell.Begin(plan);
+    std::vector<bool> cut(static_cast<std::size_t>(plan.length_mm / kBin_mm) + 2);
+    const auto step = [&] {
+      cell.Step();
+      const DriveState& drive = cell.drive();
+      if (cell.main_motion_plant().jet_on()) {
+        ASSERT_GE(drive.s_rate_mm_per_s, -1e-6) << "water while backing up at s " << drive.s_mm;
+        cut[static_cast<std::size_t>(drive.s_mm / kBin_mm)] = true;
+      }
+    };
+    const auto until = [&](const auto& condition, double limit_s) {
+      for (int i = 0;
+           i < static_cast<int>(1000 * limit_s) && !condition() && !testing::Test::HasFatalFailure(); ++i) {
+        step();
+      }
+      return condition();
+    };
+    int retraced = 0;
+    for (int k = 0; k < 4; ++k) {
+      const double hold_at_mm = dice.Between(0.2, 0.95) * plan.length_mm;
+      if (cell.drive().s_mm >= hold_at_mm ||
+          !until([&] { return cell.drive().s_mm >= hold_at_mm || cell.Finished(); }, 60.0) ||
+          cell.Finished()) {
+        continue;
+      }
+      cell.Send(Verb::kHold, kBoth);
+      ASSERT_TRUE(until(
+          [&] { return cell.drive().mode == ModuleMode::kHeld && !cell.main_motion_plant().jet_on(); }, 5.0));
+      const double held_mm = cell.drive().s_mm, back_mm = dice.Between(0.5, 40.0);
+      cell.Send(Verb::kRetrace, kBoth, back_mm);
+      ASSERT_TRUE(until([&] { return cell.drive().mode == ModuleMode::kHolding; }, 1.0));
+      ASSERT_TRUE(until([&] { return cell.drive().mode == ModuleMode::kHeld; }, 20.0));
+      EXPECT_LE(cell.drive().s_mm, held_mm + 1e-6);
+      EXPECT_GE(cell.drive().s_mm, held_mm - back_mm - 0.5);
+      retraced += cell.drive().s_mm < held_mm - 0.4 ? 1 : 0;
+      cell.Send(Verb::kResume, kBoth);
+      ASSERT_TRUE(until([&] { return cell.drive().mode == ModuleMode::kRunning || cell.Finished(); }, 20.0))
+          << Name(cell.drive().mode) << " " << Name(cell.drive().reason);
+    }
+    EXPECT_GT(retraced, 0);
+    ASSERT_TRUE(until([&] { return cell.Finished(); }, 60.0));
+    EXPECT_EQ(cell.drive().mode, ModuleMode::kComplete);
+    for (std::size_t g = 0; g < plan.gates.size(); ++g) {
+      for (double s = plan.gates[g].s_mm + kBin_mm; s < plan.events[2 * g + 1].s_mm - 2 * kBin_mm;
+           s += kBin_mm) {
+        ASSERT_TRUE(cut[static_cast<std::size_t>(s / kBin_mm)]) << "left uncut at s " << s;
+      }
+    }
+  }
+}
+
+// The planner's word about time, against the machine's, for every part that is shipped.
+TEST(PredictionLaw, ShippedPartsTakeTheTimePredicted) {
+  const MachineDescription machine = DemoMachine();
+  std::size_t parts = 0;
+  const std::string folder = std::string(std::getenv("LAMBDAJET_SOURCE_DIR")) + "/deploy/parts";
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    if (entry.path().extension() != ".ngc") {
+      continue;
+    }
+    std::ifstream file(entry.path());
+    const std::string text((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
+    const trajectory::PlannedProgram planned = trajectory::PlanPartProgram(text, machine, {});
+    ASSERT_TRUE(planned.faults.empty()) << entry.path();
+    VirtualCell cell(machine, simulated_plant::NominalPlant(machine), {});
+    const CellRun run = cell.Run(planned.plan);
+    ASSERT_TRUE(run.complete) << entry.path() << " " << Name(cell.drive().reason);
+    const double predicted_s = planned.plan.duration_s + planned.gate_time_s;
+    std::printf("%s: predicted %.3f s, simulated %.3f s, %+.3f %%\n", entry.path().filename().c_str(),
+                predicted_s, run.duration_s, 100 * (run.duration_s / predicted_s - 1));
+    EXPECT_NEAR(run.duration_s / predicted_s, 1.0, 0.01) << entry.path();
+    ++parts;
+  }
+  EXPECT_GE(parts, 5u);
 }
 
 TEST(JetLaw, IsNeverOnLongerThanTheDeadlineWithoutTheDrive) {

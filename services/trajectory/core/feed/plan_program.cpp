@@ -155,7 +155,9 @@ class Planner {
  private:
   void Stretch(std::size_t first, std::size_t end) {
     const std::span<const PathElement> elements(path_.elements.data() + first, end - first);
-    StretchPlan stretch = PlanStretch(model_, elements, at_, s_mm_);
+    const double done = static_cast<double>(first) / static_cast<double>(path_.elements.size() + 1);
+    StretchPlan stretch =
+        PlanStretch(model_, elements, at_, s_mm_, [this, done] { return progress_ && !progress_(done); });
     if (!stretch.faults.empty()) {
       result_.faults = std::move(stretch.faults);
       return;
@@ -233,7 +235,10 @@ class Planner {
 
   double GateTime(const PathElement& gate) const {
     switch (gate.gate) {
-      case GateKind::kPierce:
+      case GateKind::kPierce: {  // counted from when water and abrasive are there
+        const ProcessModel& process = model_.machine.process;
+        return gate.gate_argument + std::max(process.jet_on_delay_s, process.abrasive_on_delay_s);
+      }
       case GateKind::kDwell:
         return gate.gate_argument;
       case GateKind::kMeasure:

@@ -42,7 +42,8 @@ struct BindingLength {
   double length_mm = 0.0;
 };
 
-// A stretch of cutting path where the programmed feed is not held.
+// A stretch of cutting path where the programmed feed is not held, for one reason; where another limit takes over, another
+// stretch begins.
 struct SlowStretch {
   double from_s_mm = 0.0;
   double to_s_mm = 0.0;

@@ -129,7 +129,7 @@ class NodeBuilder {
       }
     };
     const double sigma = std::sqrt(model_.filter.variance_s2());
-    lower(0.9 * tolerance_mm / (model_.filter.kink_deviation_s() * change), FeedLimit::kCorner);
+    lower(0.9 * tolerance_mm / (model_.kink_deviation_s * change), FeedLimit::kCorner);
     if (angle > kKinkNode_rad) {
       // The kernel's peak is 0.4/sigma. Braking before and speeding up after the kink point the same way as its own change
       // of velocity, by sin(angle/2) each.

@@ -15,9 +15,11 @@ using Eigen::Vector2d;
 constexpr double kPathMargin = 0.995;  // planned against the limit, before smoothing
 constexpr double kActuatorMargin = 0.97;
 constexpr int kMostPasses = 80;
+constexpr std::size_t kAskEvery = 4096;  // segments between questions whether planning is still wanted
 constexpr int kChecksPerSegment = 16;
 constexpr double kAllowed = 1.0 + 5e-7;       // of a limit, on the final polynomials
 constexpr double kStrongestSlowDown = 0.6;    // in one pass
+constexpr double kCure = 0.985;               // slower than would just do, so that few passes are needed
 constexpr int kContourChecks = 8;             // a segment
 constexpr double kToleranceShare = 0.98;      // measured at these, held between them
 constexpr double kPlayedMargin = 1.0 + 1e-5;  // the actuators' quintics make the jet's, nearly
@@ -122,8 +124,13 @@ struct KnotActuators {
 class StretchPlanner {
  public:
   StretchPlanner(const PlanningModel& model, std::span<const PathElement> elements, const Vector2d& at,
-                 double begin_s)
-      : model_(model), elements_(elements), at_(at), begin_s_(begin_s), knot_(model.filter.knot_s) {
+                 double begin_s, const std::function<bool()>& cancelled)
+      : model_(model),
+        elements_(elements),
+        at_(at),
+        begin_s_(begin_s),
+        cancelled_(cancelled),
+        knot_(model.filter.knot_s) {
     plan_.end_s_mm = begin_s;
   }
 
@@ -132,7 +139,7 @@ class StretchPlanner {
     for (int pass = 0; plan_.faults.empty(); ++pass) {
       widening_ = 1.0 + pass / 6.0;
       SetSpeeds();
-      if (!plan_.faults.empty()) {
+      if (!plan_.faults.empty() || Cancelled()) {
         break;
       }
       SampleTime();
@@ -154,6 +161,14 @@ class StretchPlanner {
   }
 
  private:
+  bool Cancelled() {
+    if (cancelled_ && cancelled_()) {
+      plan_.faults.push_back({0, 0, "CANCELLED", "", "planning was cancelled"});
+      return true;
+    }
+    return false;
+  }
+
   void PrepareRuns() {
     planned_.resize(elements_.size());
     for (std::size_t i = 0; i < elements_.size(); ++i) {
@@ -213,6 +228,11 @@ class StretchPlanner {
       }
     }
     SolveSpeedProfile(run.solved, model_.bounds, 0.0, end_speed);
+    for (std::size_t k = 0; k < run.solved.size(); ++k) {  // eased for another reason than the limit itself
+      if (run.solved[k].binding == FeedLimit::kPathAcceleration && run.ease[k] < 1.0) {
+        run.solved[k].binding = run.slow_reason[k];
+      }
+    }
     run.end_speed_mm_per_s = std::sqrt(run.solved.back().x);
   }
 
@@ -444,6 +464,9 @@ class StretchPlanner {
     KnotActuators from = ActuatorsAt(state, lead.At(state));
     KnotState state_from = state;
     for (std::size_t n = 0; n < segment_count_ && plan_.faults.empty(); ++n) {
+      if (n % kAskEvery == kAskEvery - 1 && Cancelled()) {
+        return;
+      }
       for (std::size_t j = 1; j <= per_segment; ++j) {
         const KnotState next = EvaluateKnot(control_, first_ + n * per_segment + j, knot_);
         lead.Advance(state, next);
@@ -626,7 +649,7 @@ class StretchPlanner {
 
   static void Judge(double ratio, double power, FeedLimit reason, Excess& excess) {
     if (ratio > kAllowed) {
-      excess.Take(std::max(kStrongestSlowDown, 0.97 * std::pow(ratio, -power)), reason);
+      excess.Take(std::max(kStrongestSlowDown, kCure * std::pow(ratio, -power)), reason);
     }
   }
 
@@ -656,7 +679,9 @@ class StretchPlanner {
     }
     tolerance = pieces[piece_at_].tolerance_mm;
     double distance = DistanceTo(pieces[piece_at_], p);
-    if (distance > 0.02 * tolerance) {
+    // Neighbours only where the answer could matter: at a new largest deviation, or one that may be too large.
+    if (distance >
+        std::min(std::max(plan_.contour_deviation_mm, 0.02 * tolerance), kToleranceShare * tolerance)) {
       constexpr double kLook_mm = 1.0;
       for (std::size_t i = piece_at_;
            i-- > 0 && offset - (pieces[i].begin_mm + pieces[i].length_mm) < kLook_mm;) {
@@ -796,14 +821,13 @@ class StretchPlanner {
         continue;
       }
       const double s = planned_[i].begin_s_mm + node.offset_mm;
-      if (open == nullptr) {
+      if (open == nullptr || open->limit != node.binding) {
         plan_.slow.push_back({s, s, pieces[piece].line, node.binding, pieces[piece].feed_mm_per_s, speed});
         open = &plan_.slow.back();
       }
       open->to_s_mm = s + cell;
       if (speed < open->lowest_mm_per_s) {
         open->lowest_mm_per_s = speed;
-        open->limit = node.binding;
         open->line = pieces[piece].line;
       }
     }
@@ -849,6 +873,7 @@ class StretchPlanner {
   std::span<const PathElement> elements_;
   Vector2d at_;
   double begin_s_;
+  const std::function<bool()>& cancelled_;
   double knot_;
   StretchPlan plan_;
   std::vector<PlannedElement> planned_;
@@ -891,6 +916,7 @@ PlanningModel::PlanningModel(const MachineDescription& m, const PlanOptions& o)
       filter(SmoothingFilter::ForLimits(o.knot_s, m.path.acceleration_mm_per_s2, m.path.jerk_mm_per_s3,
                                         o.compensate ? LeadRamp(m) : 0.0)),
       overshoot(filter.overshoot()),
+      kink_deviation_s(filter.kink_deviation_s()),
       path_acceleration_mm_per_s2(kPathMargin * m.path.acceleration_mm_per_s2) {
   for (std::size_t j = 0; j < 2; ++j) {
     bounds.velocity_mm_per_s[j] = kActuatorMargin * m.actuators[j].velocity_mm_per_s;
@@ -903,8 +929,8 @@ PlanningModel::PlanningModel(const MachineDescription& m, const PlanOptions& o)
 }
 
 StretchPlan PlanStretch(const PlanningModel& model, std::span<const PathElement> elements,
-                        const Vector2d& at_W_mm, double begin_s_mm) {
-  return StretchPlanner(model, elements, at_W_mm, begin_s_mm).Plan();
+                        const Vector2d& at_W_mm, double begin_s_mm, const std::function<bool()>& cancelled) {
+  return StretchPlanner(model, elements, at_W_mm, begin_s_mm, cancelled).Plan();
 }
 
 }  // namespace lambdajet::trajectory

@@ -4,6 +4,7 @@
 // Cost: linear in path length and time; a few passes. Errors: faults with line and reason.
 #pragma once
 
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -24,7 +25,8 @@ struct PlanningModel {
   const PlanOptions& options;
   SheetMotion sheet;
   SmoothingFilter filter;
-  double overshoot = 1.0;  // of the filter, on normal acceleration
+  double overshoot = 1.0;         // of the filter, on normal acceleration
+  double kink_deviation_s = 0.0;  // of the filter
   double path_acceleration_mm_per_s2 = 0.0;
   ActuatorBounds bounds;        // with planning margin
   double elastic_lag_s2 = 0.0;  // 0: not compensated
@@ -62,8 +64,10 @@ struct StretchPlan {
   double contour_deviation_mm = 0.0;
 };
 
-// `elements`: runs and idle moves without gates; may be empty: a rest at `at_W_mm` of one segment.
+// `elements`: runs and idle moves without gates; may be empty: a rest at `at_W_mm` of one segment. `cancelled` is asked
+// some times a pass; true ends planning with CANCELLED.
 StretchPlan PlanStretch(const PlanningModel& model, std::span<const PathElement> elements,
-                        const Eigen::Vector2d& at_W_mm, double begin_s_mm);
+                        const Eigen::Vector2d& at_W_mm, double begin_s_mm,
+                        const std::function<bool()>& cancelled = {});
 
 }  // namespace lambdajet::trajectory
