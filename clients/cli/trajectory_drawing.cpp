@@ -229,6 +229,7 @@ void AddCutOptions(CLI::App& app, ToolpathVerb& verb) {
 
 struct LineVerb {
   std::string program;
+  std::string out;
   std::uint32_t line = 1;
 };
 
@@ -249,6 +250,16 @@ absl::Status TellLineStart(const LineVerb& verb, Output& output) {
     output.Fail(ExitCode::kRefused, start.reason,
                 "nothing is done in line " + std::to_string(verb.line) + " or after it");
     return absl::OkStatus();
+  }
+  if (!verb.out.empty()) {
+    const auto rest =
+        OperationsText(start.operations, verb.program + " from line " + std::to_string(verb.line));
+    if (!rest) {
+      output.Fail(ExitCode::kRefused, "NOT_AS_TEXT",
+                  "an arc outside G17, or a motion timed by G93, is not written out");
+      return absl::OkStatus();
+    }
+    return WriteTextFile(verb.out, *rest);
   }
   for (std::size_t i = 0; i < start.operations.size(); ++i) {
     output.Text(FormatOperation(start.operations[i]),
@@ -293,6 +304,7 @@ void AddDrawingVerbs(CLI::App& noun, Output& output) {
       noun.add_subcommand("from-line", "the modal state at a line, and the operations from there on");
   from->add_option("program", line->program, "G-code file; - is standard input")->required();
   from->add_option("line", line->line, "first line that is obeyed")->required();
+  from->add_option("--out", line->out, "a program of its own that begins there; - is standard output");
   from->callback([line, &output] { output.Finish(TellLineStart(*line, output)); });
 }
 

@@ -338,6 +338,52 @@ TEST(OrderLaw, IsNeverLongerThanTheDrawingsAndKeepsInnerFirst) {
   EXPECT_LT(ordered_mm, 0.8 * drawn_mm);
 }
 
+TEST(Toolpath, TabsStandAwayFromCornersAndAsLongAsAsked) {
+  const Drawing drawing = DrawingOf({Square(0, 0, 100)});
+  const ContourSet set = FindContours(drawing, {});
+  ToolpathOptions options;
+  options.tab_count = 8;
+  options.tab_mm = 0.7;
+  const Toolpath toolpath = MakeToolpath(drawing, set, options);
+  ASSERT_EQ(toolpath.cuts.size(), 1u);
+  const Cut& cut = toolpath.cuts[0];
+  ASSERT_EQ(cut.tabs.size(), 8u);
+  for (const Tab& tab : cut.tabs) {
+    EXPECT_NEAR(tab.to_mm - tab.from_mm, 0.7 + 0.8, 1e-12);  // the jet cuts half a kerf beyond each end
+    double s = 0.0;
+    for (const Piece& piece : cut.path) {  // a square's path: lines, and arcs rolled about its corners
+      const bool apart = tab.from_mm >= s + Length(piece) || tab.to_mm <= s;
+      EXPECT_TRUE(apart || !piece.is_arc());
+      s += Length(piece);
+    }
+  }
+}
+
+TEST(Toolpath, ASkippedPartIsNotCutButKeptClearOf) {
+  const Drawing drawing = DrawingOf({Square(0, 0, 50), Square(10, 10, 8), Square(50.5, 0, 50)});
+  const ContourSet set = FindContours(drawing, {});
+  ToolpathOptions options;
+  const auto reasons = [&] {
+    std::vector<std::string> list;
+    for (const Finding& f : MakeToolpath(drawing, set, options).findings) {
+      if (f.blocks) {
+        list.emplace_back(f.reason);
+      }
+    }
+    return list;
+  };
+  EXPECT_THAT(reasons(), testing::Contains("KERF_GOUGE"));
+  options.skip_parts = {2};
+  EXPECT_THAT(reasons(), testing::Contains("KERF_GOUGE"));  // part 1 would still cut into part 2
+  options.kerf_mm = 0.2;
+  const Toolpath toolpath = MakeToolpath(drawing, set, options);
+  ASSERT_EQ(toolpath.cuts.size(), 2u);
+  EXPECT_EQ(toolpath.cuts[0].part, 1);
+  EXPECT_EQ(toolpath.cuts[1].part, 1);
+  options.skip_parts = {3};
+  EXPECT_THAT(reasons(), testing::ElementsAre("NO_SUCH_PART"));
+}
+
 // ---- programmed compensation ----
 
 PartProgram Programmed(const std::string& text, double offset_mm) {
@@ -419,6 +465,41 @@ TEST(StartFromLineLaw, RestoredStateIsTheReplayedOneAtEveryLine) {
     EXPECT_EQ(ReplayModalState(start.operations), ReplayModalState(program.operations)) << "line " << line;
   }
   EXPECT_EQ(StartFromLine(program.operations, 99).reason, "LINE_NOT_IN_PROGRAM");
+}
+
+TEST(StartFromLineLaw, WrittenOutItIsTheRestOfTheProgram) {
+  const PartProgram program = ReadGcode(
+      "G20 G91\nG10 L2 P1 X1 Y2\nG54\nF40\nG0 X1 Y1\nM3 P0.5\nG1 X2\nG3 X0 Y0 I1 J0 P2\nG2 X1 Y1 R1\nG64 "
+      "P0.001\nM9\nG1 Y1\nM8\n"
+      "M5\nG4 P1\nM0\nG0 X1\nM62 P0\nG1 X1\nM5\nM2\n");
+  ASSERT_TRUE(program.faults.empty()) << program.faults[0].message;
+  for (std::uint32_t line = 1; line <= 19; ++line) {
+    const LineStart start = StartFromLine(program.operations, line);
+    const auto text = OperationsText(start.operations, "rest");
+    ASSERT_TRUE(text.has_value());
+    const PartProgram rest = ReadGcode(*text);
+    ASSERT_TRUE(rest.faults.empty()) << "line " << line << ": " << rest.faults[0].reason << " "
+                                     << rest.faults[0].message << *text;
+    const auto worked = [](const std::vector<Operation>& list) {
+      std::vector<Operation> kept;
+      std::copy_if(list.begin(), list.end(), std::back_inserter(kept), [](const Operation& o) {
+        return o.kind != OperationKind::kUnitsChange && o.kind != OperationKind::kDistanceChange &&
+               o.kind != OperationKind::kWorkOffsetChange && o.kind != OperationKind::kFeedChange;
+      });
+      return kept;
+    };
+    const auto a = worked(start.operations), b = worked(rest.operations);
+    ASSERT_EQ(a.size(), b.size()) << "line " << line;
+    for (std::size_t i = 0; i < a.size(); ++i) {
+      EXPECT_EQ(a[i].kind, b[i].kind);
+      if (a[i].kind == OperationKind::kTraverse || a[i].kind == OperationKind::kFeedLine ||
+          a[i].kind == OperationKind::kFeedArc) {
+        EXPECT_NEAR(a[i].x_W_mm, b[i].x_W_mm, 1e-6);
+        EXPECT_NEAR(a[i].y_W_mm, b[i].y_W_mm, 1e-6);
+      }
+      EXPECT_NEAR(a[i].sweep_rad, b[i].sweep_rad, 1e-6);
+    }
+  }
 }
 
 }  // namespace

@@ -7,7 +7,6 @@
 #include <dime/entities/Circle.h>
 #include <dime/entities/Ellipse.h>
 #include <dime/entities/Insert.h>
-#include <dime/entities/LWPolyline.h>
 #include <dime/entities/Line.h>
 #include <dime/entities/Polyline.h>
 #include <dime/entities/Spline.h>
@@ -124,7 +123,7 @@ class DxfReader {
     if (layer_ == "0" && depth > 0) {
       layer_ = inserted_on;
     }
-    type_ = entity.getEntityName();
+    type_ = entity.getRecord(kTypeCarrierCode, carried) ? carried.string_data : entity.getEntityName();
     curves_.clear();
     switch (entity.typeId()) {
       case dimeBase::dimeInsertType:
@@ -140,9 +139,6 @@ class DxfReader {
         break;
       case dimeBase::dimeEllipseType:
         Ellipse(static_cast<dimeEllipse&>(entity), map);
-        break;
-      case dimeBase::dimeLWPolylineType:
-        LightPolyline(static_cast<dimeLWPolyline&>(entity), map);
         break;
       case dimeBase::dimePolylineType:
         Polyline(static_cast<dimePolyline&>(entity), map);
@@ -272,21 +268,6 @@ class DxfReader {
     const Vector2d center = from + 0.5 * chord + height * Vector2d(-chord.y(), chord.x());
     const Vector2d out = from - center;
     PushArc(map, center, out.norm(), std::atan2(out.y(), out.x()), sweep);
-  }
-
-  void LightPolyline(const dimeLWPolyline& polyline, const AffineMap& map) {
-    AffineMap object;
-    const int n = polyline.getNumVertices();
-    if (!InPlane(polyline.getExtrusionDir(), map, object)) {
-      return;
-    }
-    const auto at = [&](int i) {
-      return Vector2d(Exact(polyline.getXCoords()[i]), Exact(polyline.getYCoords()[i]));
-    };
-    const int edges = (polyline.getFlags() & 1) != 0 ? n : n - 1;
-    for (int i = 0; i < edges; ++i) {
-      Edge(object, at(i), at((i + 1) % n), Exact(polyline.getBulges()[i]));
-    }
   }
 
   void Polyline(dimePolyline& polyline, const AffineMap& map) {

@@ -378,9 +378,14 @@ class Guard {
 
   void Open(const Entity& entity) {
     Put(0, entity.type);
+    Common(entity);
+  }
+  void Common(const Entity& entity) {
     const std::string_view layer = entity.Text(8);
     Put(8, GoodName(layer) ? layer : "0");
-    PutReal(kLineCarrierCode, entity.line);
+    if (entity.type != "BLOCK") {
+      PutReal(kLineCarrierCode, entity.line);
+    }
   }
   void Reals(const Entity& entity, const Keep& keep) {
     for (const int code : keep.reals) {
@@ -429,14 +434,18 @@ class Guard {
     if (vertices.size() > kMostVertices) {
       return Tell(entity, "TOO_MANY_VERTICES", "a polyline has at most 32000 vertices; split it");
     }
-    Open(entity);
-    Put(90, std::to_string(vertices.size()));
+    Put(0, "POLYLINE");
+    Common(entity);
+    Put(kTypeCarrierCode, entity.type);
+    Put(66, "1");
     Reals(entity, keep);
     for (const auto& [x, y, bulge] : vertices) {
+      Put(0, "VERTEX");
       PutReal(10, x);
       PutReal(20, y);
       PutReal(42, bulge);
     }
+    Put(0, "SEQEND");
   }
 
   void Spline(const Entity& entity, const Keep& keep) {

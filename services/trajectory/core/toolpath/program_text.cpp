@@ -193,7 +193,118 @@ std::string OutlineElement(const Piece& piece) {
          ", sweep_deg: " + Number(piece.sweep_rad * kDegrees, 9) + "}}";
 }
 
+class OperationWriter {
+ public:
+  // False: the operation has no words here.
+  bool Write(const Operation& o) {
+    switch (o.kind) {
+      case OperationKind::kTraverse:
+      case OperationKind::kFeedLine:
+      case OperationKind::kFeedArc:
+        return Motion(o);
+      case OperationKind::kUnitsChange:
+      case OperationKind::kDistanceChange:
+      case OperationKind::kWorkOffsetChange:
+        return true;  // resolved in the coordinates
+      case OperationKind::kFeedChange:
+        Feed(o.feed_mm_per_s);
+        return true;
+      case OperationKind::kPathTolerance:
+        Line(o.value > 0.0 ? "G64 P" + Number(o.value) : "G61");
+        return true;
+      case OperationKind::kPierce:
+        Line(o.value > 0.0 ? "M3 P" + Number(o.value) : "M3");
+        return true;
+      default:
+        Line(Word(o));
+        return true;
+    }
+  }
+
+  std::string text;
+
+ private:
+  void Line(const std::string& line) { text += line + "\n"; }
+
+  static std::string Word(const Operation& o) {
+    switch (o.kind) {
+      case OperationKind::kDwell:
+        return "G4 P" + Number(o.value);
+      case OperationKind::kMeasure:
+        return "M100 P" + Number(o.value);
+      case OperationKind::kStop:
+        return "M0";
+      case OperationKind::kJetOn:
+        return "M62 P0";
+      case OperationKind::kJetOff:
+        return "M63 P0";
+      case OperationKind::kAbrasiveOn:
+        return "M62 P1";
+      case OperationKind::kAbrasiveOff:
+        return "M63 P1";
+      case OperationKind::kCameraTrackOn:
+        return "M101 P" + Number(o.value);
+      case OperationKind::kCameraTrackOff:
+        return "M102";
+      default:
+        return "M2";
+    }
+  }
+
+  void Feed(double mm_per_s) {
+    if (mm_per_s > 0.0 && mm_per_s != feed_) {
+      Line("F" + Number(mm_per_s * kSecondsPerMinute));
+      feed_ = mm_per_s;
+    }
+  }
+
+  bool Motion(const Operation& o) {
+    if (o.plane != ArcPlane::kXy || (o.value > 0.0 && !(o.feed_mm_per_s > 0.0))) {
+      return false;
+    }
+    const bool arc = o.kind == OperationKind::kFeedArc;
+    if (o.kind != OperationKind::kTraverse) {
+      Feed(o.feed_mm_per_s);
+    }
+    std::string line = arc                                  ? (o.sweep_rad > 0.0 ? "G3" : "G2")
+                       : o.kind == OperationKind::kTraverse ? "G0"
+                                                            : "G1";
+    const double x = Rounded(o.x_W_mm), y = Rounded(o.y_W_mm);
+    line += " X" + Number(x) + " Y" + Number(y);
+    constexpr double kDegrees = 180.0 / std::numbers::pi;
+    const auto axis = [&](AxisBit bit, const char* letter, double value) {
+      line += (o.axes & bit) != 0 ? letter + Number(value) : "";
+    };
+    axis(kAxisZ, " Z", o.z_W_mm);
+    axis(kAxisA, " A", o.a_rad * kDegrees);
+    axis(kAxisB, " B", o.b_rad * kDegrees);
+    axis(kAxisC, " C", o.c_rad * kDegrees);
+    if (arc) {
+      line += " I" + Number(o.center_x_W_mm - x_) + " J" + Number(o.center_y_W_mm - y_);
+      const int turns = static_cast<int>(std::ceil(std::abs(o.sweep_rad) / (2.0 * std::numbers::pi) - 1e-9));
+      line += turns > 1 ? " P" + std::to_string(turns) : "";
+    }
+    Line(line);
+    x_ = x;
+    y_ = y;
+    return true;
+  }
+
+  double x_ = 0.0, y_ = 0.0, feed_ = -1.0;
+};
+
 }  // namespace
+
+std::optional<std::string> OperationsText(const std::vector<Operation>& operations, std::string_view title) {
+  OperationWriter writer;
+  writer.text = "%\n(" + Plain(title) + ")\nG21 G90 G17 G40 G94\nG54\n";
+  for (const Operation& o : operations) {
+    if (!writer.Write(o)) {
+      return std::nullopt;
+    }
+  }
+  return writer.text + "%\n";
+}
 
 std::string ProgramText(const ContourSet& contours, const Toolpath& toolpath, const ToolpathOptions& options,
                         std::string_view title) {
