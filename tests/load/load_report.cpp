@@ -15,6 +15,7 @@ constexpr double kShares[] = {0.5, 0.9, 0.99, 0.999, 0.9999, 1.0};
 constexpr double kWidth = 860.0;
 constexpr double kHeight = 380.0;
 constexpr double kLeft = 70.0;
+constexpr double kRight = 40.0;
 constexpr double kBottom = 50.0;
 constexpr double kNines = 5.0;  // the axis ends at 99.999 %
 constexpr double kLeastDecade_s = 1e-5;
@@ -22,7 +23,7 @@ constexpr double kDecades = 6.0;  // 10 µs to 10 s
 
 double X(double share) {
   const double nines = share >= 1.0 ? kNines : std::min(-std::log10(1.0 - share), kNines);
-  return kLeft + nines / kNines * (kWidth - kLeft - 20.0);
+  return kLeft + nines / kNines * (kWidth - kLeft - kRight);
 }
 
 double Y(double seconds) {
@@ -39,7 +40,7 @@ std::string Axis() {
     svg += fmt::format(
         "<line x1='{}' x2='{}' y1='{:.1f}' y2='{:.1f}' stroke='#ddd'/><text x='{}' y='{:.1f}' "
         "text-anchor='end'>{:.6g} ms</text>\n",
-        kLeft, kWidth - 20.0, y, y, kLeft - 8.0, y + 4.0, value_ms);
+        kLeft, kWidth - kRight, y, y, kLeft - 8.0, y + 4.0, value_ms);
   }
   for (int nines = 0; nines <= static_cast<int>(kNines); ++nines) {
     const double share = 1.0 - std::pow(10.0, -nines);
@@ -48,12 +49,16 @@ std::string Axis() {
         "text-anchor='middle'>{3:.7g} %</text>\n",
         X(share), kHeight - kBottom, kHeight - kBottom + 18.0, share * 100.0);
   }
+  svg += fmt::format("<text x='{}' y='{}' text-anchor='end'>share of the questions</text>\n", kWidth - kRight,
+                     kHeight - 10.0);
   return svg;
 }
 
+// Ends at the slowest one: of a thousand questions nothing is known beyond 99.9 %.
 std::string Curve(const LatencyHistogram& histogram, const char* colour, const char* dash) {
   std::string points;
-  for (double nines = 0.0; nines <= kNines; nines += 0.05) {
+  const double last = std::log10(std::max<double>(1.0, static_cast<double>(histogram.count())));
+  for (double nines = 0.0; nines <= std::min(kNines, last); nines += 0.05) {
     const double share = 1.0 - std::pow(10.0, -nines);
     points += fmt::format("{:.1f},{:.1f} ", X(share), Y(histogram.Percentile_s(std::max(share, 1e-9))));
   }
@@ -126,8 +131,10 @@ absl::Status WriteHtml(const std::string& path, const std::vector<Measured>& run
   std::ofstream file(path);
   file << "<!doctype html><html lang='en'><meta charset='utf-8'><title>Lambdajet under "
           "load</title><style>body{font:15px sans-serif;max-width:900px;"
-          "margin:2em auto}svg text{font-size:12px}td,th{padding:2px "
-          "12px;text-align:right}.bad{color:#b00}</style><h1>Lambdajet under load</h1>\n";
+          "margin:2em auto;padding:0 1em;color:#1b2733}svg{max-width:100%;height:auto}svg "
+          "text{font-size:12px}table{border-collapse:collapse}td,th{padding:4px "
+          "14px;text-align:right;border-bottom:1px solid "
+          "#d7dee5}.bad{color:#b3261e;font-weight:bold}</style><h1>Lambdajet under load</h1>\n";
   for (const Measured& run : runs) {
     file << Section(run);
   }
