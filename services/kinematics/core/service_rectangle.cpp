@@ -151,7 +151,7 @@ std::string_view ServiceLimitSentence(ServiceLimit limit) {
 ServiceRectangle LargestServiceRectangle(const ServiceAreaMachine& machine) {
   Expects(FaultOf(machine).empty(), "LargestServiceRectangle: a machine without fault");
   const Region region(machine);
-  constexpr int kGrid = 64;
+  constexpr int kGrid = 32;
   const double left = region.axis_mm() - region.half_width_mm();
   double step = 2.0 * region.half_width_mm() / kGrid;
   double from = 0.0, to = 0.0;
@@ -172,7 +172,7 @@ ServiceRectangle LargestServiceRectangle(const ServiceAreaMachine& machine) {
     }
   }
   // The area has ridges where two limits bind at once, so many directions are tried before the step shrinks.
-  constexpr int kReach = 4;
+  constexpr int kReach = 2;
   for (; best.area_mm2 > 0.0 && step > 1e-6; step *= 0.5) {
     for (bool improved = true; improved;) {
       improved = false;
