@@ -123,7 +123,7 @@ class DxfReader {
     if (layer_ == "0" && depth > 0) {
       layer_ = inserted_on;
     }
-    type_ = entity.getRecord(kTypeCarrierCode, carried) ? carried.string_data : entity.getEntityName();
+    type_ = entity.getRecord(kLightCarrierCode, carried) ? "LWPOLYLINE" : entity.getEntityName();
     curves_.clear();
     switch (entity.typeId()) {
       case dimeBase::dimeInsertType:

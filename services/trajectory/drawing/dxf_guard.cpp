@@ -436,7 +436,7 @@ class Guard {
     }
     Put(0, "POLYLINE");
     Common(entity);
-    Put(kTypeCarrierCode, entity.type);
+    PutReal(kLightCarrierCode, 1.0);
     Put(66, "1");
     Reals(entity, keep);
     for (const auto& [x, y, bulge] : vertices) {

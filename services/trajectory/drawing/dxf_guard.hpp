@@ -30,8 +30,8 @@ struct GuardedDxf {
 
 // The group code that carries the line an entity begins on (a line type scale otherwise, which no contour needs).
 inline constexpr int kLineCarrierCode = 48;
-// And the one that carries the type of an entity that was rewritten as another (a line type's name otherwise).
-inline constexpr int kTypeCarrierCode = 6;
+// And the one that says that a polyline was a light one (a line type's dash otherwise).
+inline constexpr int kLightCarrierCode = 49;
 
 GuardedDxf GuardDxf(std::string_view file);
 
