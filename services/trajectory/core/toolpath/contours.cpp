@@ -59,7 +59,7 @@ class ContourFinder {
             "",
             "",
             0,
-            {},
+            {0.0, 0.0},
             0.0,
             "the file does not say its unit ($INSUNITS is missing or 0); name it with --units mm or inch"});
       return std::move(set_);
@@ -82,8 +82,14 @@ class ContourFinder {
     }
     Nest();
     if (set_.contours.empty() && set_.marks.empty() && !set_.blocked()) {
-      Tell(
-          {"NOTHING_TO_CUT", true, "", "", 0, {}, 0.0, "no contour stands on a layer that is cut or marked"});
+      Tell({"NOTHING_TO_CUT",
+            true,
+            "",
+            "",
+            0,
+            {0.0, 0.0},
+            0.0,
+            "no contour stands on a layer that is cut or marked"});
     }
     return std::move(set_);
   }

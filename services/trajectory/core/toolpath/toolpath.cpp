@@ -107,7 +107,7 @@ class ToolpathMaker {
                                     "",
                                     "",
                                     0,
-                                    {},
+                                    {0.0, 0.0},
                                     0.0,
                                     "part " + std::to_string(part) +
                                         " cannot be skipped; the drawing has parts 1 … " +
