@@ -117,6 +117,36 @@ TEST_F(Modules, AResumeAskedForWhileStillHoldingPiercesAgainAndGoesOn) {
   ASSERT_TRUE(Drive(ModuleMode::kComplete, 20.0));
 }
 
+// Main motion falls silent just when the drive stands, having backed up for a RESUME.
+class SilentAtStandstill : public Modules {
+ protected:
+  void HoldAndResumeIntoSilence() {
+    Cut();
+    Told(Verb::kHold);
+    ASSERT_TRUE(Drive(ModuleMode::kHeld));
+    EXPECT_EQ(Told(Verb::kResume).answer, CommandAnswer::kDone);
+    ASSERT_TRUE(Drive(ModuleMode::kHolding)) << "backing up";
+    cell_.set_main_motion_running(false);
+    ASSERT_TRUE(Drive(ModuleMode::kHeld));
+    cell_.Step(0.05);
+    EXPECT_EQ(cell_.drive().mode, ModuleMode::kHeld);
+  }
+};
+
+TEST_F(SilentAtStandstill, TheResumeWaitsForThePeer) {
+  HoldAndResumeIntoSilence();
+  cell_.set_main_motion_running(true);
+  EXPECT_TRUE(Drive(ModuleMode::kComplete, 20.0));
+}
+
+TEST_F(SilentAtStandstill, AHoldTakesTheResumeBack) {
+  HoldAndResumeIntoSilence();
+  Told(Verb::kHold);
+  cell_.set_main_motion_running(true);
+  cell_.Step(1.0);
+  EXPECT_EQ(cell_.drive().mode, ModuleMode::kHeld);
+}
+
 TEST_F(Modules, OverrideChangesTheRateAndIsRefusedOutsideItsRange) {
   Cut();
   EXPECT_EQ(Told(Verb::kOverride, 0.5).answer, CommandAnswer::kDone);

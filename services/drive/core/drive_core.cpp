@@ -462,9 +462,10 @@ void DriveCore::WatchMotion() {
   const PlayHead now = play_.At(now_ns_);
   if ((mode_ == kHolding || mode_ == kStopping) && !retracing_ && Standing()) {
     Apply(Event::kStandstill, reason_);
-    if (mode_ == kHeld && resume_afterwards_ && PeerFit()) {
-      Apply(Event::kResume, reason_);
-    }
+  }
+  if (mode_ == kHeld && resume_afterwards_ &&
+      PeerFit()) {  // as soon as the peer is fit, if it is not just now
+    Apply(Event::kResume, reason_);
   }
   if (mode_ == kArmed && start_at_ns_ != 0 && now_ns_ >= start_at_ns_) {
     start_at_ns_ = 0;

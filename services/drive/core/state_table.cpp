@@ -53,7 +53,7 @@ constexpr std::array kTable = std::to_array<Row>({
     {kHolding, E::kStop, {kStopping, A::kRampDown}},
     {kHolding, E::kFault, {kFault, A::kDisable}},
 
-    {kHeld, E::kHold, {kHeld, A::kNone}},
+    {kHeld, E::kHold, {kHeld, A::kRampDown}},  // takes a resume back that still waits for the peer
     {kHeld, E::kBackUp, {kHolding, A::kBackUp}},
     {kHeld, E::kRetrace, {kHolding, A::kRetrace}},
     {kHeld, E::kResume, {kResuming, A::kAwaitPeer}},
