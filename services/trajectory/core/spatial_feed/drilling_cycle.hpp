@@ -1,0 +1,38 @@
+// Writes drilling cycles (G81, G82, G83, G73) out as canonical moves along a tool axis that may be tilted.
+//
+// Model: LinuxCNC's canned cycles with heights measured along the tool's axis from the place where it enters the part, so
+// that at A0 B0 they are LinuxCNC's own: traverse over the hole at the higher of where the tool is and the clear height,
+// traverse to R, feed to the bottom, dwell, traverse out. A peck goes out to R and traverses back to 0.254 mm (0.010 inch)
+// above where it stopped; a chip break (G73) goes back by as much only. The tool's axis from tip to spindle is
+// Rz(C) Ry(B) Rx(A) z_W. Frames: W. Units: mm, mm/s, s, rad. Threads: pure.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+#include "trajectory/core/part_program/operation.hpp"
+
+namespace lambdajet::trajectory {
+
+struct DrilledHole {
+  Eigen::Vector3d entry_W_mm = Eigen::Vector3d::Zero();  // the axis goes through it; heights count from it
+  double a_rad = 0.0;
+  double b_rad = 0.0;
+  double c_rad = 0.0;
+  double retract_mm = 0.0;  // R
+  double bottom_mm = 0.0;   // Z, below R
+  double clear_mm = 0.0;    // where the cycle ends: R (G99) or the height before the cycle (G98), not below R
+  double peck_mm = 0.0;     // Q; 0: in one go
+  bool chip_break = false;  // G73: back by 0.254 mm instead of out to R
+  double dwell_s = 0.0;     // P at the bottom
+  double feed_mm_per_s = 0.0;
+  std::uint32_t line = 0;
+};
+
+// Unit vector from tip to spindle.
+Eigen::Vector3d ToolAxis_W(double a_rad, double b_rad, double c_rad);
+
+void AppendDrilledHole(const DrilledHole& hole, std::vector<Operation>& operations);
+
+}  // namespace lambdajet::trajectory
