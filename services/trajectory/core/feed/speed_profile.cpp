@@ -32,17 +32,18 @@ void Lower(ProfileNodeOf<N>& node, double x, FeedLimit reason) {
 
 // Largest x for which some u meets both the path's circle and the actuator's strip.
 double CircleAndStrip(double a, double k, const ActuatorRow& row) {
-  if (row.limit >= std::abs(row.slope) * a && row.bend == 0.0) {
+  const double b = std::abs(row.bend);
+  if (b == 0.0) {
     return kNone;
   }
-  const double b = std::abs(row.bend);
   const double s = row.slope;
-  // (b x - limit)^2 <= s^2 (a^2 - k^2 x^2), upper root.
+  // b x - limit <= s sqrt(a^2 - k^2 x^2): the upper root of its square, which is that of b x > limit unless the circle ends
+  // before.
   const double p = b * b + s * s * k * k;
   const double q = b * row.limit;
   const double r = row.limit * row.limit - s * s * a * a;
   const double d = q * q - p * r;
-  return p > 0.0 && d >= 0.0 ? (q + std::sqrt(d)) / p : kNone;
+  return d >= 0.0 ? std::max((q + std::sqrt(d)) / p, row.limit / b) : kNone;
 }
 
 // Largest x for which two strips share a u: |b1/s1 - b2/s2| x <= l1/s1 + l2/s2.

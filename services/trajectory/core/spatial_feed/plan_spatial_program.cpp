@@ -153,7 +153,7 @@ class ProgramPlanner {
     }
     std::sort(out_.binding.begin(), out_.binding.end(),
               [](const auto& a, const auto& b) { return a.length_mm > b.length_mm; });
-    out_.smallest_margin = 1e9;
+    out_.singular_margin_ratio = 1e9;
     out_.shortest_mm.setConstant(1e9);
     out_.longest_mm.setConstant(-1e9);
     for (std::size_t i = 0; i < out_.samples.size(); ++i) {
@@ -161,7 +161,7 @@ class ProgramPlanner {
       const Pose X_MP = model_.struts.PlatformAt(sample.p_W_mm, sample.q_W);
       const double margin = kinematics::AnalyseSingularity(model_.struts.hexapod(), X_MP).signed_margin;
       const StrutVector lengths = kinematics::SolveInverse(model_.struts.hexapod(), X_MP).lengths_mm;
-      out_.smallest_margin = std::min(out_.smallest_margin, margin);
+      out_.singular_margin_ratio = std::min(out_.singular_margin_ratio, margin);
       out_.shortest_mm = out_.shortest_mm.cwiseMin(lengths);
       out_.longest_mm = out_.longest_mm.cwiseMax(lengths);
       if (i + 1 < out_.samples.size() && sample.cutting && sample.path_speed_mm_per_s > 1e-6) {

@@ -30,7 +30,7 @@ struct PlannedSpatialProgram {
   double turn_deviation_rad = 0.0;
   double cutting_time_s = 0.0;
   double gate_time_s = 0.0;
-  double smallest_margin = 0.0;  // singular, over the samples, mm/mm
+  double singular_margin_ratio = 0.0;  // singular, over the samples, mm/mm
   StrutVector shortest_mm = StrutVector::Zero();
   StrutVector longest_mm = StrutVector::Zero();
 };

@@ -87,7 +87,7 @@ SpatialKnot EvaluateKnot(const std::vector<SpatialSample>& control, std::size_t 
   knot.tool.twist.v_mm_per_s = first.head<3>();
   knot.tool.rate.a_mm_per_s2 = second.head<3>();
   knot.jerk_mm_per_s3 = third.head<3>();
-  knot.s_mm = value[7], knot.s_first = first[7], knot.s_second = second[7];
+  knot.s_mm = value[7], knot.path_speed_mm_per_s = first[7], knot.path_acceleration_mm_per_s2 = second[7];
   Turning(value, first, second, third, knot);
   return knot;
 }

@@ -23,8 +23,8 @@ struct SpatialKnot {
   Eigen::Vector3d jerk_mm_per_s3 = Eigen::Vector3d::Zero();
   Eigen::Vector3d turn_jerk_rad_per_s3 = Eigen::Vector3d::Zero();
   double s_mm = 0.0;
-  double s_first = 0.0;
-  double s_second = 0.0;
+  double path_speed_mm_per_s = 0.0;
+  double path_acceleration_mm_per_s2 = 0.0;
 };
 
 // The motion at control point `index`; needs two neighbours either side.

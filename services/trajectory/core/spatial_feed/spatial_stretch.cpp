@@ -217,7 +217,7 @@ class StretchPlanner {
     for (int j = 0; j < kStrutCount; ++j) {
       ends.q[static_cast<std::size_t>(j)] = {state.q_mm[j], state.first[j], state.second[j]};
     }
-    ends.s = {knot.s_mm, knot.s_first, knot.s_second};
+    ends.s = {knot.s_mm, knot.path_speed_mm_per_s, knot.path_acceleration_mm_per_s2};
     ProgramFault fault;
     if (!model_.struts.Reaches(knot.tool.p_mm, knot.tool.q, PieceAt(knot.s_mm - begin_s_).line, fault)) {
       plan_.faults.push_back(fault);
@@ -505,7 +505,7 @@ class StretchPlanner {
       }
       const SpatialPiece& piece = PieceAt(offset);
       plan_.samples.push_back({static_cast<double>(n) * knot_, k.s_mm, k.tool.p_mm, k.tool.q,
-                               k.tool.twist.v_mm_per_s.norm(), k.s_first, solved_[node].binding,
+                               k.tool.twist.v_mm_per_s.norm(), k.path_speed_mm_per_s, solved_[node].binding,
                                piece.cutting, piece.line});
     }
   }

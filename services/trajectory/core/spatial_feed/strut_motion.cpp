@@ -7,6 +7,8 @@
 namespace lambdajet::trajectory {
 namespace {
 
+constexpr double kDegrees = 180.0 / static_cast<double>(EIGEN_PI);
+
 // W against the tool as it stands at A0 B0 C0; its own inverse.
 Eigen::Matrix3d HalfTurn() { return Eigen::Vector3d(1, -1, -1).asDiagonal(); }
 
@@ -50,9 +52,8 @@ bool StrutMotion::Reaches(const Eigen::Vector3d& p_W_mm, const Eigen::Quaternion
       text, sizeof text,
       "the machine cannot hold the tool at X%.3f Y%.3f Z%.3f A%.2f B%.2f C%.2f deg: beyond %s%s by %.3g "
       "(mm, rad or mm/mm); move the part or tilt less",
-      p_W_mm.x(), p_W_mm.y(), p_W_mm.z(), r.roll_rad * 180 / EIGEN_PI, r.pitch_rad * 180 / EIGEN_PI,
-      r.yaw_rad * 180 / EIGEN_PI, std::string(kinematics::BoundName(answer.bound)).c_str(), strut.c_str(),
-      answer.excess);
+      p_W_mm.x(), p_W_mm.y(), p_W_mm.z(), r.roll_rad * kDegrees, r.pitch_rad * kDegrees, r.yaw_rad * kDegrees,
+      std::string(kinematics::BoundName(answer.bound)).c_str(), strut.c_str(), answer.excess);
   fault = {line, 0, kinematics::ReasonName(answer.reason), "", text};
   return false;
 }

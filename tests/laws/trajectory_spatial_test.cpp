@@ -1,0 +1,382 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdio>
+#include <string>
+
+#include "tests/laws/trajectory_spatial_cases.hpp"
+#include "tests/laws/trajectory_spatial_reference.hpp"
+
+namespace lambdajet::trajectory {
+namespace {
+
+using Eigen::Quaterniond;
+using Eigen::Vector3d;
+
+PlannedSpatialProgram PlanOf(const std::vector<Operation>& operations,
+                             const HexapodMotion& motion = WorkedMotion(),
+                             const SpatialOptions& options = {}) {
+  return PlanSpatialProgram(operations, "worked", WorkedHexapod(), motion, options);
+}
+
+// Struts that are the weakest link.
+HexapodMotion LameStruts() {
+  HexapodMotion m = WorkedMotion();
+  m.strut_velocity_mm_per_s = 90;
+  m.strut_acceleration_mm_per_s2 = 900;
+  m.strut_jerk_mm_per_s3 = 20000;
+  return m;
+}
+
+std::string FaultText(const PlannedSpatialProgram& p) {
+  return p.faults.empty() ? ""
+                          : std::to_string(p.faults[0].line) + " " + std::string(p.faults[0].reason) + " " +
+                                p.faults[0].message;
+}
+
+Quaterniond RotationOf(const Operation& o) {
+  return Quaterniond(Eigen::AngleAxisd(o.c_rad, Vector3d::UnitZ()) *
+                     Eigen::AngleAxisd(o.b_rad, Vector3d::UnitY()) *
+                     Eigen::AngleAxisd(o.a_rad, Vector3d::UnitX()));
+}
+
+// A programmed block as the words say it: the tip by its share of the way, the rotation by the sphere's great circle.
+struct Block {
+  Operation from, to;
+  double tolerance_mm = 0.0;
+  Vector3d TipAt(double u) const {
+    const Vector3d a(from.x_W_mm, from.y_W_mm, from.z_W_mm), b(to.x_W_mm, to.y_W_mm, to.z_W_mm);
+    if (to.kind != OperationKind::kFeedArc) {
+      return a + u * (b - a);
+    }
+    const int n = to.plane == ArcPlane::kXy ? 2 : to.plane == ArcPlane::kZx ? 1 : 0;
+    Vector3d centre(to.center_x_W_mm, to.center_y_W_mm, to.center_z_W_mm);
+    centre[n] = a[n];
+    const Vector3d out = a - centre, side = Vector3d::Unit(n).cross(out);
+    Vector3d p = centre + std::cos(u * to.sweep_rad) * out + std::sin(u * to.sweep_rad) * side;
+    p[n] = a[n] + u * (b[n] - a[n]);
+    return p;
+  }
+  Quaterniond TurnAt(double u) const { return RotationOf(from).slerp(u, RotationOf(to)); }
+  // Larger of both shares of tolerance.
+  double Ratio(double u, const Vector3d& p, const Quaterniond& q) const {
+    return std::max((p - TipAt(u)).norm() / tolerance_mm,
+                    q.angularDistance(TurnAt(u)) / WorkedMotion().corner_tolerance_rad);
+  }
+  double Nearest(const Vector3d& p, const Quaterniond& q) const {
+    double best = 1e9, at = 0.0;
+    const int kCoarse = to.kind == OperationKind::kFeedArc ? 40 : 10;
+    for (int i = 0; i <= kCoarse; ++i) {
+      const double ratio = Ratio(i / static_cast<double>(kCoarse), p, q);
+      if (ratio < best) {
+        best = ratio, at = i / static_cast<double>(kCoarse);
+      }
+    }
+    double a = std::max(0.0, at - 1.0 / kCoarse), b = std::min(1.0, at + 1.0 / kCoarse);
+    for (int i = 0; i < 34; ++i) {
+      const double c = a + 0.382 * (b - a), d = a + 0.618 * (b - a);
+      (Ratio(c, p, q) < Ratio(d, p, q) ? b : a) = Ratio(c, p, q) < Ratio(d, p, q) ? d : c;
+    }
+    return std::min(best, Ratio(0.5 * (a + b), p, q));
+  }
+};
+
+std::vector<Block> BlocksOf(const std::vector<Operation>& operations) {
+  std::vector<Block> blocks;
+  const Operation* last = nullptr;
+  double tolerance = WorkedMotion().corner_tolerance_mm;
+  for (const Operation& o : operations) {
+    if (o.kind == OperationKind::kPathTolerance) {
+      tolerance = o.value;
+    } else if (o.kind <= OperationKind::kFeedArc) {
+      if (last != nullptr) {
+        blocks.push_back({*last, o, tolerance > 0.0 ? tolerance : WorkedMotion().corner_tolerance_mm});
+      }
+      last = &o;
+    }
+  }
+  return blocks;
+}
+
+struct Worst {
+  double velocity = 0.0, acceleration = 0.0, jerk = 0.0, path_acceleration = 0.0, ratio = 0.0;
+  double forward_mm = 0.0, forward_rad = 0.0;
+};
+
+void SampleLimits(const SpatialPlan& plan, const HexapodMotion& m, Worst& worst) {
+  for (const SpatialSegment& s : plan.segments) {
+    for (double t = 0.0; t <= s.duration_s; t += 1e-4) {
+      for (const Polynomial& q : s.q_mm) {
+        worst.velocity = std::max(worst.velocity, std::abs(q.first(t)) / m.strut_velocity_mm_per_s);
+        worst.acceleration =
+            std::max(worst.acceleration, std::abs(q.second(t)) / m.strut_acceleration_mm_per_s2);
+        worst.jerk = std::max(worst.jerk, std::abs(q.third(t)) / m.strut_jerk_mm_per_s3);
+      }
+    }
+  }
+}
+
+// Plays the struts through the forward kinematics; path acceleration, way back to the planned pose, and tolerance.
+void PlayForward(const PlannedSpatialProgram& planned, const std::vector<Block>& blocks, double step_s,
+                 Worst& worst) {
+  const StrutMotion machine(WorkedHexapod(), WorkedMotion().X_MT_zero);
+  Pose X_MP = machine.PlatformAt(planned.samples.front().p_W_mm, planned.samples.front().q_W);
+  std::size_t at = 0;
+  for (double tau = 0.0; tau < planned.plan.duration_s; tau += step_s) {
+    const StrutState struts = StrutsAt(planned.plan, tau);
+    const kinematics::HexapodForward forward = kinematics::SolveForward(machine.hexapod(), struts.q_mm, X_MP);
+    ASSERT_EQ(forward.reason, kinematics::Reason::kSolved) << "at " << tau;
+    X_MP = forward.X_MP;
+    const kinematics::PlatformMotion motion =
+        kinematics::PlatformMotionOf(machine.hexapod(), X_MP, {struts.first, struts.second});
+    const Vector3d lever = X_MP.R * machine.hexapod().geometry().X_PT.p_mm;
+    const TwistRate rate = AtLever(motion.twist, motion.rate, lever);
+    worst.path_acceleration = std::max(
+        worst.path_acceleration,
+        std::hypot(rate.a_mm_per_s2.norm(), planned.plan.turn_radius_mm * rate.alpha_rad_per_s2.norm()) /
+            WorkedMotion().path_acceleration_mm_per_s2);
+    const Pose tool = machine.ToolAt(X_MP);
+    const Quaterniond q(tool.R);
+    double nearest = 1e9;
+    for (std::size_t i = at; i < std::min(at + 40, blocks.size()) && nearest > 0.02; ++i) {
+      const double ratio = blocks[i].Nearest(tool.p_mm, q);
+      if (ratio < nearest) {
+        nearest = ratio;
+        if (ratio < 1.0 && i > at + 4) {
+          at = i - 4;
+        }
+      }
+    }
+    worst.ratio = std::max(worst.ratio, nearest);
+  }
+  for (const SpatialPlanSample& sample : planned.samples) {
+    if (sample.tau_s < planned.plan.duration_s) {
+      const Pose start = machine.PlatformAt(sample.p_W_mm, sample.q_W);
+      const Pose tool = machine.ToolAt(
+          kinematics::SolveForward(machine.hexapod(), StrutsAt(planned.plan, sample.tau_s).q_mm, start).X_MP);
+      worst.forward_mm = std::max(worst.forward_mm, (tool.p_mm - sample.p_W_mm).norm());
+      worst.forward_rad = std::max(worst.forward_rad, Quaterniond(tool.R).angularDistance(sample.q_W));
+    }
+  }
+}
+
+TEST(SpatialPlan, KeepsEveryLimitAndBothTolerancesOnRandomPrograms) {
+  Worst worst;
+  double duration = 0.0;
+  int planned_count = 0;
+  for (std::uint64_t seed = 1; seed <= 12; ++seed) {
+    const std::vector<Operation> operations = RandomSpatialProgram(seed).Draw(12);
+    const HexapodMotion motion = seed % 2 == 0 ? LameStruts() : WorkedMotion();
+    const PlannedSpatialProgram planned = PlanOf(operations, motion);
+    ASSERT_TRUE(planned.faults.empty()) << "seed " << seed << ": " << FaultText(planned);
+    SampleLimits(planned.plan, motion, worst);
+    PlayForward(planned, BlocksOf(operations), 0.01, worst);
+    duration += planned.plan.duration_s;
+    ++planned_count;
+  }
+  std::printf(
+      "%d programs, %.0f s: of their limits velocity %.6f acceleration %.6f jerk %.6f path acceleration "
+      "%.6f, of "
+      "tolerance %.4f; forward from struts %.1e mm %.1e rad\n",
+      planned_count, duration, worst.velocity, worst.acceleration, worst.jerk, worst.path_acceleration,
+      worst.ratio, worst.forward_mm, worst.forward_rad);
+  EXPECT_LE(worst.velocity, 1.0 + 1e-6);
+  EXPECT_LE(worst.acceleration, 1.0 + 1e-6);
+  EXPECT_LE(worst.jerk, 1.0 + 1e-6);
+  EXPECT_LE(worst.path_acceleration, 1.0 + 1e-6);
+  EXPECT_LE(worst.ratio, 1.0);
+  EXPECT_LE(worst.forward_mm, 1e-3);
+  EXPECT_LE(worst.forward_rad, 1e-5);
+}
+
+// The plain reference on every block, with the limits themselves; every corner exact, jerk without limit.
+TEST(SpatialPlan, LastsNearlyTheTimeOptimalBoundWithJerkInactive) {
+  for (const HexapodMotion& limits : {WorkedMotion(), LameStruts()}) {
+    HexapodMotion motion = limits;
+    motion.path_jerk_mm_per_s3 = 1e9;
+    motion.strut_jerk_mm_per_s3 = 1e12;
+    std::vector<Operation> operations = {
+        SpatialMove(OperationKind::kTraverse, {-80, -60, 20}, {0, 0, 0}, 0, 1)};
+    Operation exact;
+    exact.kind = OperationKind::kPathTolerance;
+    operations.push_back(exact);
+    operations.push_back(SpatialMove(OperationKind::kFeedLine, {80, 60, 20}, {0.2, -0.1, 0.1}, 120, 2));
+    operations.push_back(SpatialMove(OperationKind::kTraverse, {-80, 70, 50}, {-0.2, 0.2, -0.2}, 0, 3));
+    operations.push_back(SpatialMove(OperationKind::kFeedLine, {90, 0, 10}, {0.1, -0.2, 0.2}, 150, 4));
+    Operation arc = SpatialMove(OperationKind::kFeedArc, {-90, 0, 30}, {0, 0.2, 0}, 100, 5);
+    arc.sweep_rad = std::numbers::pi;
+    operations.push_back(arc);
+    operations.push_back(SpatialMove(OperationKind::kTraverse, {60, -80, 60}, {0.15, 0.1, 0.3}, 0, 6));
+    SpatialOptions options;
+    options.knot_s = 0.00025;
+    const PlannedSpatialProgram planned = PlanOf(operations, motion, options);
+    ASSERT_TRUE(planned.faults.empty()) << FaultText(planned);
+    const StrutMotion struts(WorkedHexapod(), motion.X_MT_zero);
+    ActuatorBoundsOf<6> bounds;
+    bounds.velocity_mm_per_s.fill(motion.strut_velocity_mm_per_s);
+    bounds.acceleration_mm_per_s2.fill(motion.strut_acceleration_mm_per_s2);
+    double bound = 0.0;
+    for (const SpatialRun& run : MakeSpatialPath(operations, motion, struts.hexapod().lever_mm(), 1.0).runs) {
+      constexpr int kCells = 4000;
+      const SpatialPiece& piece = run.pieces.at(0);
+      std::vector<ProfileNodeOf<6>> nodes(kCells + 1);
+      for (std::size_t i = 0; i < nodes.size(); ++i) {
+        const double offset = piece.length_mm * static_cast<double>(i) / kCells;
+        const SpatialPoint at = PointOn(piece, offset);
+        const StrutState state =
+            struts.At({at.p_mm, at.q, {at.tangent, at.turn}, {at.bend, Vector3d::Zero()}});
+        nodes[i].offset_mm = offset;
+        nodes[i].speed_cap_mm_per_s = piece.feed_mm_per_s;
+        nodes[i].curvature = at.bend.norm();
+        nodes[i].acceleration_mm_per_s2 = motion.path_acceleration_mm_per_s2;
+        Eigen::Map<StrutVector>(nodes[i].A.data()) = state.first;
+        Eigen::Map<StrutVector>(nodes[i].B.data()) = state.second;
+      }
+      bound += ReferenceDuration(nodes, bounds);
+    }
+    std::printf("jerk inactive: %.4f s, time-optimal bound %.4f s, ratio %.4f\n", planned.plan.duration_s,
+                bound, planned.plan.duration_s / bound);
+    EXPECT_LE(planned.plan.duration_s, 1.03 * bound);
+    EXPECT_GE(planned.plan.duration_s, bound);
+  }
+}
+
+TEST(SpatialPlan, TimingOfSixActuatorsIsThatOfThePlainReference) {
+  std::mt19937_64 random(3);
+  double worst = 0.0;
+  for (int i = 0; i < 6; ++i) {
+    const TimedPath<6> path = TimedPath<6>::Random(random, 400.0);
+    std::vector<ProfileNodeOf<6>> nodes = path.Nodes(8000);
+    SolveSpeedProfile(nodes, path.bounds, 0.0, 0.0);
+    worst = std::max(
+        worst, std::abs(ProfileDuration(nodes) / ReferenceDuration(path.Nodes(40000), path.bounds) - 1.0));
+    for (const ProfileNodeOf<6>& node : nodes) {
+      const AccelerationInterval u = Allowed(node, path.bounds, node.x * (1 - 1e-12));
+      ASSERT_LE(u.from, u.to + 1e-6);
+    }
+  }
+  EXPECT_LE(worst, 1e-4);
+}
+
+std::vector<Operation> MovesOf(const std::vector<Operation>& operations) {
+  std::vector<Operation> moves;
+  std::copy_if(operations.begin(), operations.end(), std::back_inserter(moves),
+               [](const Operation& o) { return o.kind <= OperationKind::kFeedArc; });
+  return moves;
+}
+
+TEST(SpatialPlan, LastsAsLongBackwards) {
+  double worst = 0.0;
+  for (std::uint64_t seed = 21; seed <= 26; ++seed) {
+    const std::vector<Operation> there = MovesOf(RandomSpatialProgram(seed).Draw(8));
+    std::vector<Operation> back = {there.back()};
+    back[0].kind = OperationKind::kTraverse;
+    for (std::size_t i = there.size() - 1; i > 0; --i) {
+      Operation o = there[i];
+      o.x_W_mm = there[i - 1].x_W_mm, o.y_W_mm = there[i - 1].y_W_mm, o.z_W_mm = there[i - 1].z_W_mm;
+      o.a_rad = there[i - 1].a_rad, o.b_rad = there[i - 1].b_rad, o.c_rad = there[i - 1].c_rad;
+      o.sweep_rad = -o.sweep_rad;
+      back.push_back(o);
+    }
+    const PlannedSpatialProgram forth = PlanOf(there), reversed = PlanOf(back);
+    ASSERT_TRUE(forth.faults.empty() && reversed.faults.empty()) << FaultText(forth) << FaultText(reversed);
+    EXPECT_NEAR(forth.plan.length_mm, reversed.plan.length_mm, 1e-6);
+    worst = std::max(worst, std::abs(forth.plan.duration_s / reversed.plan.duration_s - 1.0));
+  }
+  std::printf("backwards: durations differ by at most %.1e\n", worst);
+  EXPECT_LE(worst, 5e-3);
+}
+
+// Slowing is repeated until every limit holds, which may turn rounding into another pass: only a plan that needs little of it
+// is the same to the last digits.
+TEST(SpatialPlan, TurnsWithTheMachineBy120Degrees) {
+  const Eigen::Matrix3d R = RotationZ(2.0 * std::numbers::pi / 3.0);
+  for (std::uint64_t seed = 31; seed <= 34; ++seed) {
+    const std::vector<Operation> here = RandomSpatialProgram(seed, true).Draw(8);
+    std::vector<Operation> there = here;
+    for (Operation& o : there) {
+      const Vector3d p = R * Vector3d(o.x_W_mm, o.y_W_mm, o.z_W_mm);
+      const Vector3d c = R * Vector3d(o.center_x_W_mm, o.center_y_W_mm, o.center_z_W_mm);
+      o.x_W_mm = p.x(), o.y_W_mm = p.y();
+      o.center_x_W_mm = c.x(), o.center_y_W_mm = c.y();
+    }
+    const PlannedSpatialProgram a = PlanOf(here), b = PlanOf(there);
+    ASSERT_TRUE(a.faults.empty() && b.faults.empty()) << FaultText(a) << FaultText(b);
+    ASSERT_EQ(a.plan.segments.size(), b.plan.segments.size()) << "seed " << seed;
+    for (double tau = 0.0; tau < a.plan.duration_s; tau += 0.05) {
+      const StrutVector q = StrutsAt(a.plan, tau).q_mm, turned = StrutsAt(b.plan, tau).q_mm;
+      for (int j = 0; j < kStruts; ++j) {
+        ASSERT_NEAR(q[j], turned[(j + 4) % kStruts], 1e-6)
+            << "seed " << seed << " strut " << j + 1 << " at " << tau;
+      }
+    }
+    const double lame =
+        PlanOf(here, LameStruts()).plan.duration_s / PlanOf(there, LameStruts()).plan.duration_s;
+    EXPECT_NEAR(lame, 1.0, 0.02) << "seed " << seed;
+  }
+}
+
+TEST(SpatialPlan, RefusesWithTheLine) {
+  const auto reason_of = [](const Vector3d& p, const Vector3d& abc) {
+    const PlannedSpatialProgram planned =
+        PlanOf({SpatialMove(OperationKind::kTraverse, {0, 0, 20}, {0, 0, 0}, 0, 1),
+                SpatialMove(OperationKind::kFeedLine, {10, 0, 20}, {0, 0, 0}, 50, 2),
+                SpatialMove(OperationKind::kFeedLine, p, abc, 50, 7)});
+    EXPECT_TRUE(planned.plan.segments.empty());
+    EXPECT_EQ(planned.faults.size(), 1u);
+    return planned.faults.empty()
+               ? std::string()
+               : std::to_string(planned.faults[0].line) + " " + std::string(planned.faults[0].reason) + " " +
+                     planned.faults[0].message;
+  };
+  EXPECT_THAT(reason_of({500, 0, 20}, {0, 0, 0}), testing::HasSubstr("beyond STRUT_M"));
+  EXPECT_THAT(reason_of({0, 0, 20}, {0, 0, 1.2}), testing::HasSubstr("JOINT_CONE"));
+  EXPECT_THAT(reason_of({0, 0, 20}, {0, 0, 3.1}), testing::StartsWith("7 TURN_TOO_LARGE"));
+  EXPECT_THAT(reason_of({500, 0, 20}, {0, 0, 0}), testing::StartsWith("7 "));
+}
+
+TEST(DrillingCycle, PecksAsLinuxCncDoesAtNoTilt) {
+  DrilledHole hole;
+  hole.entry_W_mm = {10, 20, 0};
+  hole.retract_mm = 2, hole.bottom_mm = -10, hole.clear_mm = 15, hole.peck_mm = 4, hole.dwell_s = 0.5;
+  std::vector<Operation> moves;
+  AppendDrilledHole(hole, moves);
+  std::vector<double> heights;
+  for (const Operation& o : moves) {
+    heights.push_back(o.kind == OperationKind::kDwell ? 99.0 : o.z_W_mm);
+    EXPECT_TRUE(o.kind == OperationKind::kDwell || (o.x_W_mm == 10 && o.y_W_mm == 20));
+  }
+  EXPECT_THAT(heights, testing::Pointwise(testing::DoubleNear(1e-12), {15.0, 2.0, -2.0, 2.0, -1.746, -6.0,
+                                                                       2.0, -5.746, -10.0, 99.0, 15.0}));
+}
+
+TEST(DrillingCycle, FeedsAlongTheTiltedAxisAndDwellsAtItsBottom) {
+  DrilledHole hole;
+  hole.entry_W_mm = {30, -20, 0};
+  hole.a_rad = 0.25, hole.b_rad = -0.2;
+  hole.retract_mm = hole.clear_mm = 3, hole.bottom_mm = -12, hole.dwell_s = 0.3, hole.feed_mm_per_s = 10;
+  std::vector<Operation> operations = {SpatialMove(OperationKind::kTraverse, {0, 0, 30}, {0, 0, 0}, 0, 1)};
+  AppendDrilledHole(hole, operations);
+  const PlannedSpatialProgram planned = PlanOf(operations);
+  ASSERT_TRUE(planned.faults.empty()) << FaultText(planned);
+  ASSERT_EQ(planned.plan.gates.size(), 1u);
+  EXPECT_EQ(planned.plan.gates[0].kind, GateKind::kDwell);
+  EXPECT_EQ(planned.gate_time_s, 0.3);
+  // What the rotary words mean, written out: the axis is Ry(B) Rx(A) z.
+  const double a = hole.a_rad, b = hole.b_rad;
+  const Vector3d axis(std::cos(a) * std::sin(b), -std::sin(a), std::cos(a) * std::cos(b));
+  double deepest = 0.0;
+  for (const SpatialPlanSample& s : planned.samples) {
+    const double height = axis.dot(s.p_W_mm - hole.entry_W_mm);
+    deepest = std::min(deepest, height);
+    if (height < 0.0) {
+      EXPECT_LE((s.p_W_mm - hole.entry_W_mm - height * axis).norm(), 1e-6);
+      EXPECT_LE((s.q_W * Vector3d::UnitZ() - axis).norm(), 1e-9);
+      EXPECT_LE(s.tip_speed_mm_per_s, s.cutting ? 10.0 * 1.001 : 400.0);
+    }
+  }
+  EXPECT_NEAR(deepest, -12.0, 1e-9);
+}
+
+}  // namespace
+}  // namespace lambdajet::trajectory
