@@ -3,8 +3,10 @@
 #include <string>
 
 #include "clients/cli/csv.hpp"
+#include "clients/cli/program_faults.hpp"
 #include "clients/cli/text_file.hpp"
 #include "clients/cli/trajectory_pictures.hpp"
+#include "clients/cli/trajectory_spatial.hpp"
 #include "clients/cli/verbs.hpp"
 #include "foundation/contract/trouble.hpp"
 #include "platform/machine_file/machine_file.hpp"
@@ -24,31 +26,13 @@ constexpr double kDefaultStep_s = 0.004;
 struct ProgramVerb {
   std::string program;
   std::string machine = "deploy/config/machine.yaml";
+  std::string hexapod;  // set: its file instead of the machine's
   std::string out;
   std::string colour = "speed";
   double step_s = kDefaultStep_s;
   double start_from_s_mm = -1.0;
   PlanOptions options;
 };
-
-// Prints what is wrong as compilers do, FILE:LINE:COLUMN, and ends with the exit code of a refusal.
-void TellFaults(const std::string& file, const std::vector<ProgramFault>& faults, Output& output) {
-  nlohmann::json list = nlohmann::json::array();
-  for (const ProgramFault& fault : faults) {
-    const std::string place = file + ":" + std::to_string(fault.line) +
-                              (fault.column > 0 ? ":" + std::to_string(fault.column) : "");
-    output.Text(place + ": " + std::string(fault.reason) +
-                    (fault.word.empty() ? "" : " '" + fault.word + "'") + ": " + fault.message,
-                Tone::kBad);
-    list.push_back({{"line", fault.line},
-                    {"column", fault.column},
-                    {"reason", std::string(fault.reason)},
-                    {"word", fault.word},
-                    {"message", fault.message}});
-  }
-  output.Json({{"faults", list}});
-  output.Exit(ExitCode::kRefused);
-}
 
 absl::Status Canon(const ProgramVerb& verb, Output& output) {
   const auto text = ReadTextFile(verb.program);
@@ -200,7 +184,14 @@ CsvTable SampleTable(const PlannedProgram& p, double step_s) {
   return table;
 }
 
+SpatialVerb SpatialOf(const ProgramVerb& verb) {
+  return {verb.program, verb.hexapod, verb.out, verb.colour, verb.step_s, verb.options.feed_scale};
+}
+
 absl::Status PlanVerb(const ProgramVerb& verb, Output& output) {
+  if (!verb.hexapod.empty()) {
+    return PlanSpatial(SpatialOf(verb), output);
+  }
   MachineDescription machine;
   const auto planned = PlanFile(verb, output, machine);
   if (!planned.ok()) {
@@ -223,6 +214,9 @@ absl::Status PlanVerb(const ProgramVerb& verb, Output& output) {
 }
 
 absl::Status DrawVerb(const ProgramVerb& verb, Output& output) {
+  if (!verb.hexapod.empty()) {
+    return DrawSpatial(SpatialOf(verb), output);
+  }
   MachineDescription machine;
   const auto planned = PlanFile(verb, output, machine);
   if (!planned.ok()) {
@@ -251,6 +245,8 @@ CLI::App* AddProgramVerb(CLI::App& noun, Output& output, const char* name, const
 
 void AddPlanOptions(CLI::App& app, const std::shared_ptr<ProgramVerb>& verb) {
   app.add_option("--machine", verb->machine, "YAML file of the machine")->capture_default_str();
+  app.add_option("--hexapod", verb->hexapod, "YAML file of a hexapod, for programs in X Y Z A B C")
+      ->excludes("--machine");
   app.add_flag("--compensate", verb->options.compensate,
                "elastic feed-forward, corner feed from predicted error");
   app.add_option("--tolerance-mm", verb->options.tolerance_mm, "predicted error allowed with --compensate");
