@@ -33,6 +33,17 @@ Eigen::Vector3d ToolAxis_W(double a_rad, double b_rad, double c_rad) {
   return RollPitchYaw{a_rad, b_rad, c_rad}.Rotation().col(2);
 }
 
+void AlignWithTool(std::span<Operation> moves, double surface_W_mm) {
+  for (Operation& o : moves) {
+    const bool moves_tool = o.kind == OperationKind::kTraverse || o.kind == OperationKind::kFeedLine;
+    if (moves_tool && (o.a_rad != 0.0 || o.b_rad != 0.0)) {
+      const Eigen::Vector3d entry(o.x_W_mm, o.y_W_mm, surface_W_mm);
+      const Eigen::Vector3d p = entry + (o.z_W_mm - surface_W_mm) * ToolAxis_W(o.a_rad, o.b_rad, o.c_rad);
+      o.x_W_mm = p.x(), o.y_W_mm = p.y(), o.z_W_mm = p.z();
+    }
+  }
+}
+
 void AppendDrilledHole(const DrilledHole& hole, std::vector<Operation>& operations) {
   Expects(hole.bottom_mm < hole.retract_mm && hole.clear_mm >= hole.retract_mm && hole.peck_mm >= 0.0,
           "AppendDrilledHole: the bottom lies below R, R not above the clear height, and pecks go down");

@@ -9,6 +9,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "trajectory/core/part_program/operation.hpp"
@@ -32,6 +33,10 @@ struct DrilledHole {
 
 // Unit vector from tip to spindle.
 Eigen::Vector3d ToolAxis_W(double a_rad, double b_rad, double c_rad);
+
+// Lays the moves of cycles that were written out along z_W along their tools' axes: a move to X Y Z goes to the place at height
+// Z - surface along the tool's axis through X Y at the surface. Nothing changes where the tool stands upright.
+void AlignWithTool(std::span<Operation> moves, double surface_W_mm);
 
 void AppendDrilledHole(const DrilledHole& hole, std::vector<Operation>& operations);
 

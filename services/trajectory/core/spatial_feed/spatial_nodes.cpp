@@ -122,7 +122,7 @@ class NodeBuilder {
         reason = FeedLimit::kCorner;
       }
     };
-    const double deviation_s = model_.filter.kink_deviation_s();
+    const double deviation_s = model_.kink_deviation_s;
     lower(0.9 * tolerance_mm / (deviation_s * std::max(1e-12, change.head<3>().norm())));
     lower(0.9 * model_.motion.corner_tolerance_rad /
           (deviation_s * std::max(1e-12, change.tail<3>().norm())));
@@ -222,6 +222,7 @@ SpatialModel::SpatialModel(const HexapodGeometry& geometry, const HexapodMotion&
       turn_radius_mm(struts.hexapod().lever_mm()),
       filter(FilterFor(m, o)),
       overshoot(filter.overshoot()),
+      kink_deviation_s(filter.kink_deviation_s()),
       path_acceleration_mm_per_s2(kPathMargin * m.path_acceleration_mm_per_s2) {
   bounds.velocity_mm_per_s.fill(kActuatorMargin * m.strut_velocity_mm_per_s);
   bounds.acceleration_mm_per_s2.fill(kActuatorMargin * m.strut_acceleration_mm_per_s2);

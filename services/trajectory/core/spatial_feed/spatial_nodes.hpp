@@ -31,7 +31,8 @@ struct SpatialModel {
   StrutMotion struts;
   double turn_radius_mm = 0.0;
   SmoothingFilter filter;
-  double overshoot = 1.0;  // of the filter, on normal acceleration
+  double overshoot = 1.0;         // of the filter, on normal acceleration
+  double kink_deviation_s = 0.0;  // of the filter
   double path_acceleration_mm_per_s2 = 0.0;
   ActuatorBoundsOf<6> bounds;  // with planning margin
 };

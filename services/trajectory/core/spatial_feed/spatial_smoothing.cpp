@@ -8,6 +8,8 @@ namespace {
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
+constexpr double kStanding2_mm2 = 1e-18;  // of way over two samples
+
 // Running mean over an odd number of samples; ends are held; the sum is taken anew now and then.
 void MovingAverage(const std::vector<SpatialSample>& in, int width, std::vector<SpatialSample>& out) {
   constexpr std::size_t kFresh = 256;
@@ -31,17 +33,25 @@ void MovingAverage(const std::vector<SpatialSample>& in, int width, std::vector<
   }
 }
 
-void CorrectOutwards(const std::vector<SpatialSample>& in, double half_variance_samples,
+// Half the variance times the normal acceleration, averaged itself; what stands stays where it is.
+void CorrectOutwards(const std::vector<SpatialSample>& in, double half_variance_samples, int width,
                      std::vector<SpatialSample>& out) {
+  std::vector<SpatialSample> averaged;
+  const auto along_at = [&](std::size_t i) -> Vector3d { return (in[i + 1] - in[i - 1]).head<3>(); };
+  out.assign(in.size(), SpatialSample::Zero());
+  for (std::size_t i = 1; i + 1 < in.size(); ++i) {
+    const Vector3d along = along_at(i);
+    if (along.squaredNorm() >= kStanding2_mm2) {
+      const Vector3d bend = (in[i + 1] - 2.0 * in[i] + in[i - 1]).head<3>();
+      out[i].head<3>() = -half_variance_samples * (bend - along * (along.dot(bend) / along.squaredNorm()));
+    }
+  }
+  MovingAverage(out, width, averaged);
   out = in;
   for (std::size_t i = 1; i + 1 < in.size(); ++i) {
-    const Vector3d along = (in[i + 1] - in[i - 1]).head<3>();
-    const double along2 = along.squaredNorm();
-    if (along2 < 1e-18) {
-      continue;
+    if (along_at(i).squaredNorm() >= kStanding2_mm2) {
+      out[i] += averaged[i];
     }
-    const Vector3d bend = (in[i + 1] - 2.0 * in[i] + in[i - 1]).head<3>();
-    out[i].head<3>() -= half_variance_samples * (bend - along * (along.dot(bend) / along2));
   }
 }
 
@@ -67,7 +77,8 @@ void Turning(const SpatialSample& value, const SpatialSample& first, const Spati
 
 std::vector<SpatialSample> Smooth(const SmoothingFilter& filter, const std::vector<SpatialSample>& samples) {
   std::vector<SpatialSample> a, b;
-  CorrectOutwards(samples, 0.5 * filter.variance_s2() / (filter.knot_s * filter.knot_s), a);
+  CorrectOutwards(samples, 0.5 * filter.variance_s2() / (filter.knot_s * filter.knot_s),
+                  filter.correction_width, a);
   MovingAverage(a, filter.first_width, b);
   MovingAverage(b, filter.second_width, a);
   return a;
