@@ -32,6 +32,8 @@ struct ProgramVerb {
   double step_s = kDefaultStep_s;
   double start_from_s_mm = -1.0;
   PlanOptions options;
+  std::string axes = "xy";
+  trajectory::GcodeOptions reading;
 };
 
 absl::Status Canon(const ProgramVerb& verb, Output& output) {
@@ -39,7 +41,9 @@ absl::Status Canon(const ProgramVerb& verb, Output& output) {
   if (!text.ok()) {
     return text.status();
   }
-  const trajectory::PartProgram program = trajectory::ReadGcode(*text);
+  trajectory::GcodeOptions reading = verb.reading;
+  reading.axes = verb.axes == "xy" ? trajectory::kPlanarAxes : trajectory::kSixAxes;
+  const trajectory::PartProgram program = trajectory::ReadGcode(*text, reading);
   if (!program.faults.empty()) {
     TellFaults(verb.program, program.faults, output);
     return absl::OkStatus();
@@ -51,10 +55,17 @@ absl::Status Canon(const ProgramVerb& verb, Output& output) {
                    {"operation", std::string(OperationName(o.kind))},
                    {"x_W_mm", o.x_W_mm},
                    {"y_W_mm", o.y_W_mm},
+                   {"z_W_mm", o.z_W_mm},
+                   {"a_rad", o.a_rad},
+                   {"b_rad", o.b_rad},
+                   {"c_rad", o.c_rad},
+                   {"plane", 17 + static_cast<int>(o.plane)},
                    {"center_x_W_mm", o.center_x_W_mm},
                    {"center_y_W_mm", o.center_y_W_mm},
+                   {"center_z_W_mm", o.center_z_W_mm},
                    {"sweep_rad", o.sweep_rad},
                    {"feed_mm_per_s", o.feed_mm_per_s},
+                   {"kerf_offset_mm", o.kerf_offset_mm},
                    {"value", o.value}});
     }
   }
@@ -258,8 +269,15 @@ void AddPlanOptions(CLI::App& app, const std::shared_ptr<ProgramVerb>& verb) {
 }  // namespace
 
 void AddTrajectoryVerbs(CLI::App& noun, Output& output) {
-  AddProgramVerb(noun, output, "canon", "the program's canonical operations, one a line",
-                 std::make_shared<ProgramVerb>(), Canon);
+  const auto canon = std::make_shared<ProgramVerb>();
+  CLI::App* canon_app =
+      AddProgramVerb(noun, output, "canon", "the program's canonical operations, one a line", canon, Canon);
+  canon_app->add_option("--axes", canon->axes, "of the machine the program is read for")
+      ->check(CLI::IsMember({"xy", "xyzabc"}))
+      ->capture_default_str();
+  canon_app->add_flag("--leave-out-z", canon->reading.leave_out_z,
+                      "with xy: Z words of a flat program are read over, not refused");
+  canon_app->add_option("--kerf-width-mm", canon->reading.kerf_width_mm, "for G41 and G42 without a width");
   const auto check = std::make_shared<ProgramVerb>();
   CLI::App* check_app =
       AddProgramVerb(noun, output, "check", "whether a program can be cut; exit code 4 if not", check, Check);

@@ -52,6 +52,7 @@ absl::StatusOr<std::optional<SpatialFiles>> PlanFiles(const SpatialVerb& verb, O
   trajectory::GcodeOptions reading;
   ForSixAxes(reading);
   reading.default_tolerance_mm = machine->motion.corner_tolerance_mm;
+  reading.kerf_compensation = false;  // the planner moves no contour
   const trajectory::PartProgram program = trajectory::ReadGcode(*text, reading);
   if (!program.faults.empty()) {
     TellFaults(verb.program, program.faults, output);

@@ -54,6 +54,9 @@ PathDefaults DefaultsOf(const MachineDescription& machine, const PlanOptions& op
 GcodeOptions ReaderOptionsOf(const MachineDescription& machine) {
   GcodeOptions options;
   options.default_tolerance_mm = machine.path.corner_tolerance_mm;
+  options.kerf_width_mm = machine.process.kerf_width_mm;
+  options.kerf_compensation =
+      false;  // the planner moves no contour; marked motions would be cut where they are written
   options.fault_limit = kFaultLimit;
   return options;
 }

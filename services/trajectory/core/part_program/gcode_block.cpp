@@ -1,0 +1,645 @@
+// Obeys one block in LinuxCNC's order of execution: comment, feed mode, feed, outputs, jet, abrasive, words of the machine,
+// dwell, plane, units, kerf, length, work offset, path mode, distance, return mode, reference and offsets, motion, stop.
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "trajectory/core/part_program/gcode_reading.hpp"
+
+namespace lambdajet::trajectory {
+namespace {
+
+constexpr double kInchMm = 25.4;
+constexpr double kLongestPierce_s = 600.0;
+constexpr double kLongestDwell_s = 3600.0;
+constexpr double kLargestTolerance_mm = 10.0;
+constexpr double kSlowestFeed = 1e-6;  // units a minute, or one over minutes
+constexpr double kFastestFeed = 1e9;
+constexpr double kMostMarks = 1e6;
+constexpr double kMostRepeats = 9999.0;
+constexpr double kWhole = 1e-4;
+
+int GroupOfG(int tenfold) {
+  switch (tenfold) {
+    case 0:
+    case 10:
+    case 20:
+    case 30:
+    case 50:
+    case 51:
+    case 800:
+    case 810:
+    case 820:
+    case 830:
+      return kMotion;
+    case 40:
+    case 100:
+    case 280:
+    case 281:
+    case 300:
+    case 301:
+    case 520:
+    case 530:
+    case 920:
+    case 921:
+    case 922:
+    case 923:
+      return kOnce;
+    case 170:
+    case 180:
+    case 190:
+      return kPlane;
+    case 200:
+    case 210:
+      return kUnits;
+    case 400:
+    case 410:
+    case 411:
+    case 420:
+    case 421:
+      return kKerf;
+    case 430:
+    case 431:
+    case 490:
+      return kLength;
+    case 540:
+    case 550:
+    case 560:
+    case 570:
+    case 580:
+    case 590:
+    case 591:
+    case 592:
+    case 593:
+      return kOffset;
+    default:
+      return kNoCode;
+  }
+}
+
+int ModeGroupOfG(int tenfold) {
+  switch (tenfold) {
+    case 610:
+    case 611:
+    case 640:
+      return kPathMode;
+    case 900:
+    case 910:
+      return kDistance;
+    case 901:
+    case 911:
+      return kArcDistance;
+    case 930:
+    case 940:
+      return kFeedMode;
+    case 980:
+    case 990:
+      return kReturnMode;
+    default:
+      return GroupOfG(tenfold);
+  }
+}
+
+int GroupOfM(int tenfold) {
+  switch (tenfold) {
+    case 0:
+    case 10:
+    case 20:
+    case 300:
+      return kStopping;
+    case 30:
+    case 40:
+    case 50:
+      return kJet;
+    case 70:
+    case 80:
+    case 90:
+      return kAbrasive;
+    case 620:
+    case 630:
+    case 640:
+    case 650:
+    case 660:
+    case 670:
+    case 680:
+      return kOutput;
+    case 980:
+    case 990:
+      return kCallWord;
+    case 1000:
+    case 1010:
+    case 1020:
+      return kMachineWord;
+    default:
+      return kNoCode;
+  }
+}
+
+// Words a shop may well write that this reader refuses, with what to write instead.
+const char* AdviceOnG(int tenfold) {
+  switch (tenfold) {
+    case 52:
+    case 53:
+      return "write NURBS as G5, G1, G2 and G3";
+    case 950:
+    case 960:
+    case 970:
+      return "there is no spindle; feed is in units a minute, G94, or inverse time, G93";
+    case 70:
+    case 80:
+      return "there is no lathe's diameter mode";
+    case 730:
+    case 740:
+    case 760:
+    case 840:
+    case 850:
+    case 860:
+    case 870:
+    case 880:
+    case 890:
+      return "of the drilling cycles G81, G82 and G83 are obeyed";
+    default:
+      return "not a word of this machine; see the table of supported words";
+  }
+}
+
+// ---- which words stand in the line ----
+
+bool Sort(Reading& r, Code c, int group, char letter) {
+  r.columns[0] = c.column;  // for the faults below; the motion word overwrites it
+  if (group == kNoCode) {
+    return r.FaultAt(kMotion, letter == 'G' ? "UNKNOWN_G_CODE" : "UNKNOWN_M_CODE",
+                     letter == 'G' ? AdviceOnG(c.tenfold)
+                                   : "not a word of this machine; see the table of supported words");
+  }
+  const auto g = static_cast<std::size_t>(group);
+  if (r.codes[g] != kNoCode) {
+    return r.FaultAt(kMotion, "MODAL_GROUP_TWICE",
+                     "two words of one modal group contradict each other in this line");
+  }
+  r.codes[g] = c.tenfold;
+  r.columns[g] = c.column;
+  return true;
+}
+
+bool SortCodes(Reading& r) {
+  r.codes.fill(kNoCode);
+  std::uint32_t motion_column = 0;
+  for (int i = 0; i < r.block.g_count; ++i) {
+    const Code c = r.block.g[static_cast<std::size_t>(i)];
+    const int group = ModeGroupOfG(c.tenfold);
+    if (!Sort(r, c, group, 'G')) {
+      return false;
+    }
+    motion_column = group == kMotion ? c.column : motion_column;
+  }
+  for (int i = 0; i < r.block.m_count; ++i) {
+    const Code c = r.block.m[static_cast<std::size_t>(i)];
+    if (!Sort(r, c, GroupOfM(c.tenfold), 'M')) {
+      return false;
+    }
+  }
+  r.columns[kMotion] = motion_column;
+  return true;
+}
+
+bool TakesP(int motion) { return motion == 20 || motion == 30 || motion == 50 || motion == 820; }
+
+// Which words of this line want a P; more than one would have to share it.
+bool OneTakesP(Reading& r) {
+  const int once = r.code(kOnce), machine = r.code(kMachineWord);
+  const int takers = (once == 40) + (once == 100) + (r.code(kJet) == 30 || r.code(kJet) == 40) +
+                     (r.code(kOutput) != kNoCode) + (machine == 1000 || machine == 1010) +
+                     (r.code(kPathMode) == 640) + (r.code(kCallWord) == 980) + TakesP(r.code(kMotion));
+  return takers < 2 || !r.block.has('P') ||
+         r.FaultAt('P', "P_AMBIGUOUS",
+                   "two words of this line could take this P; write them in lines of their own");
+}
+
+// What LinuxCNC refuses while compensation is on; G40 in the same line comes before what follows it in the order above.
+bool KerfAllows(Reading& r) {
+  if (r.state.kerf_code == 400) {
+    return true;
+  }
+  const auto refuse = [&r](Group group) {
+    return r.FaultAt(group, "NOT_WITH_KERF_ON", "G40 must stand before");
+  };
+  if (r.code(kPlane) != kNoCode && r.code(kPlane) != 170) {
+    return refuse(kPlane);
+  }
+  if (r.code(kUnits) != kNoCode && (r.code(kUnits) == 210) != (r.state.unit_mm == 1.0)) {
+    return refuse(kUnits);
+  }
+  if (r.code(kKerf) == 400) {
+    return true;
+  }
+  if (r.code(kOnce) != kNoCode && r.code(kOnce) != 40) {
+    return refuse(kOnce);
+  }
+  for (const Group group : {kOffset, kPathMode, kLength}) {
+    if (r.code(group) != kNoCode) {
+      return refuse(group);
+    }
+  }
+  const int motion = r.code(kMotion);
+  return (motion != 50 && motion != 51 && motion < 810) || refuse(kMotion);
+}
+
+// ---- feed ----
+
+bool TakeFeed(Reading& r) {
+  ModalState& s = r.state;
+  if (r.code(kFeedMode) != kNoCode) {
+    const bool inverse = r.code(kFeedMode) == 930;
+    if (s.inverse_time && !inverse) {
+      s.feed_mm_per_s = s.feed_deg_per_s = s.feed_per_min = 0.0;  // must be given again
+    }
+    s.inverse_time = inverse;
+  }
+  if (!r.block.has('F')) {
+    return true;
+  }
+  const double f = r.block.Take('F');
+  if (!(f > 0.0)) {
+    return r.FaultAt('F', "FEED_NOT_POSITIVE", "the feed must be above 0");
+  }
+  if (!(f >= kSlowestFeed && f <= kFastestFeed)) {
+    return r.FaultAt('F', "FEED_OUT_OF_RANGE", "F is 1e-6 … 1e9");
+  }
+  s.feed_per_min = f;
+  return true;
+}
+
+// In millimetres only now, as F counts in the units of its own line.
+void SettleFeed(Reading& r) {
+  ModalState& s = r.state;
+  if (s.inverse_time || !r.block.has('F')) {
+    return;
+  }
+  s.feed_deg_per_s = s.feed_per_min / kSecondsPerMinute;
+  const double feed = s.feed_per_min * s.unit_mm / kSecondsPerMinute;
+  if (feed != s.feed_mm_per_s) {
+    s.feed_mm_per_s = feed;
+    r.Add(OperationKind::kFeedChange);
+  }
+}
+
+// ---- jet, abrasive, outputs, words of the machine ----
+
+bool Pierce(Reading& r) {
+  if (r.state.jet_on) {
+    return r.FaultAt(kJet, "JET_ALREADY_ON", "M5 must stand before the next pierce");
+  }
+  Operation& o = r.Add(OperationKind::kPierce);
+  if (r.block.has('P')) {
+    o.value = r.block.Take('P');
+    if (!(o.value > 0.0 && o.value <= kLongestPierce_s)) {
+      return r.FaultAt('P', "PIERCE_TIME_OUT_OF_RANGE", "a pierce takes more than 0 and at most 600 s");
+    }
+  }
+  r.state.jet_on = r.state.abrasive_on = true;
+  return true;
+}
+
+bool Jet(Reading& r) {
+  switch (r.code(kJet)) {
+    case 30:
+    case 40:
+      return Pierce(r);
+    case 50:
+      SwitchJetOff(r);
+      return true;
+    default:
+      return true;
+  }
+}
+
+void SwitchAbrasive(Reading& r, bool on) {
+  r.Add(on ? OperationKind::kAbrasiveOn : OperationKind::kAbrasiveOff);
+  r.state.abrasive_on = on;
+}
+
+bool Abrasive(Reading& r) {
+  const int m = r.code(kAbrasive);
+  if (m != kNoCode && (m != 90) != r.state.abrasive_on) {
+    SwitchAbrasive(r, m != 90);
+  }
+  return true;
+}
+
+bool Outputs(Reading& r) {
+  const int m = r.code(kOutput);
+  if (m == kNoCode) {
+    return true;
+  }
+  if (m == 660) {
+    return r.FaultAt(kOutput, "INPUT_UNKNOWN", "this machine has no inputs that a program could wait for");
+  }
+  if (m >= 670 || !r.block.has('P') || (r.block.at('P') != 0.0 && r.block.at('P') != 1.0)) {
+    return r.FaultAt(kOutput, "OUTPUT_UNKNOWN", "P0 is the jet, P1 the abrasive; there are no others");
+  }
+  const bool jet = r.block.Take('P') == 0.0;
+  const bool on = m == 620 || m == 640;
+  if (m == 640 || m == 650) {
+    r.Add(OperationKind::kDwell);  // at once: not on the fly, but where the motion before has ended
+  }
+  if (jet && !on) {
+    SwitchJetOff(r);
+  } else if (jet) {
+    r.Add(OperationKind::kJetOn);
+    r.state.jet_on = true;
+  } else {
+    SwitchAbrasive(r, on);
+  }
+  return true;
+}
+
+bool MachineWords(Reading& r) {
+  const int m = r.code(kMachineWord);
+  if (m == kNoCode) {
+    return true;
+  }
+  if (m == 1020) {
+    r.Add(OperationKind::kCameraTrackOff);
+    return true;
+  }
+  const double mark = r.block.has('P') ? r.block.Take('P') : -1.0;
+  if (!(mark >= 0.0 && mark <= kMostMarks) || mark != std::floor(mark)) {
+    return r.FaultAt(kMachineWord, "MARK_MISSING", "P must name the mark, a whole number from 0");
+  }
+  if (m == 1000 && r.state.jet_on) {
+    return r.FaultAt(kMachineWord, "MEASURE_WITH_JET_ON", "M5 must stand before");
+  }
+  r.Add(m == 1000 ? OperationKind::kMeasure : OperationKind::kCameraTrackOn).value = mark;
+  return true;
+}
+
+bool Dwell(Reading& r) {
+  if (r.code(kOnce) != 40) {
+    return true;
+  }
+  if (!r.block.has('P')) {
+    return r.FaultAt(kOnce, "DWELL_TIME_MISSING", "G4 needs P in seconds");
+  }
+  const double seconds = r.block.Take('P');
+  if (!(seconds >= 0.0 && seconds <= kLongestDwell_s)) {
+    return r.FaultAt('P', "DWELL_TIME_OUT_OF_RANGE", "a dwell takes 0 to 3600 s");
+  }
+  r.Add(OperationKind::kDwell).value = seconds;
+  return true;
+}
+
+// ---- modes ----
+
+bool Plane(Reading& r) {
+  const int g = r.code(kPlane);
+  if (g == kNoCode) {
+    return true;
+  }
+  if (g != 170 && (r.options.axes & (kAxisX | kAxisY | kAxisZ)) != (kAxisX | kAxisY | kAxisZ)) {
+    return r.FaultAt(kPlane, "PLANE_NOT_DRIVEN", "this machine drives X and Y; its plane is G17");
+  }
+  r.state.plane = g == 170 ? ArcPlane::kXy : g == 180 ? ArcPlane::kZx : ArcPlane::kYz;
+  return true;
+}
+
+bool Units(Reading& r) {
+  if (r.code(kUnits) != kNoCode) {
+    r.state.unit_mm = r.code(kUnits) == 200 ? kInchMm : 1.0;
+    r.Add(OperationKind::kUnitsChange).value = r.state.unit_mm;
+  }
+  SettleFeed(r);
+  return true;
+}
+
+// The tool of G41 and G42: the jet itself, or one that G10 L1 has described.
+bool KerfRadius(Reading& r, int g, double& radius_mm) {
+  const bool dynamic = g == 411 || g == 421;
+  if (dynamic && !r.block.has('D')) {
+    return r.FaultAt(kKerf, "KERF_DIAMETER_MISSING", "G41.1 and G42.1 need D, the width of the kerf");
+  }
+  const double d = r.block.has('D') ? r.block.Take('D') : 0.0;
+  if (dynamic) {
+    radius_mm = 0.5 * r.mm(d);
+  } else {
+    const auto tool = r.tools.find(
+        std::abs(d - std::round(d)) <= kWhole && std::abs(d) < 1e6 ? static_cast<int>(std::round(d)) : -1);
+    if (tool == r.tools.end()) {
+      return r.FaultAt('D', "TOOL_UNKNOWN", "D0 and D1 are the jet; G10 L1 describes others");
+    }
+    radius_mm = tool->second.radius_mm;
+  }
+  const char* should = "a kerf is more than 0 and at most 20 mm wide; is the machine's kerf width known?";
+  return (radius_mm > 0.0 && radius_mm <= 10.0) || r.FaultAt(kKerf, "KERF_WIDTH_OUT_OF_RANGE", should);
+}
+
+bool Kerf(Reading& r) {
+  const int g = r.code(kKerf);
+  if (g == kNoCode) {
+    return true;
+  }
+  ModalState& s = r.state;
+  if (g == 400) {
+    s.kerf_ends = s.kerf_code != 400;
+    s.kerf_code = 400;
+    s.kerf_offset_mm = 0.0;
+    return true;
+  }
+  if (!r.options.kerf_compensation) {
+    return r.FaultAt(kKerf, "KERF_NOT_SUPPORTED", "write the kerf-offset centreline");
+  }
+  if (s.kerf_code != 400) {
+    return r.FaultAt(kKerf, "KERF_ALREADY_ON", "G40 must stand before");
+  }
+  if (s.plane != ArcPlane::kXy) {
+    return r.FaultAt(kKerf, "KERF_PLANE", "the kerf is compensated in the XY plane, G17");
+  }
+  double radius_mm = 0.0;
+  if (!KerfRadius(r, g, radius_mm)) {
+    return false;
+  }
+  s.kerf_code = g;
+  s.kerf_offset_mm = g < 420 ? radius_mm : -radius_mm;
+  s.kerf_ends = false;
+  return true;
+}
+
+bool PathMode(Reading& r) {
+  const int g = r.code(kPathMode);
+  if (g == kNoCode) {
+    return true;
+  }
+  double tolerance_mm = g == 640 ? r.options.default_tolerance_mm : 0.0;
+  if (g == 640 && r.block.has('P')) {
+    tolerance_mm = r.mm(r.block.Take('P'));
+    if (!(tolerance_mm > 0.0 && tolerance_mm <= kLargestTolerance_mm)) {
+      return r.FaultAt('P', "TOLERANCE_OUT_OF_RANGE", "a path tolerance is above 0 and at most 10 mm");
+    }
+  }
+  // Q allows short lines to be joined; nobody has to.
+  if (g == 640 && r.block.has('Q') && !(r.block.Take('Q') >= 0.0)) {
+    return r.FaultAt('Q', "TOLERANCE_OUT_OF_RANGE", "Q of G64 is 0 or more");
+  }
+  r.state.path_tolerance_mm = tolerance_mm > 0.0 ? tolerance_mm : r.options.default_tolerance_mm;
+  r.Add(OperationKind::kPathTolerance).value = tolerance_mm;
+  return true;
+}
+
+bool DistanceModes(Reading& r) {
+  if (r.code(kDistance) != kNoCode) {
+    r.state.absolute = r.code(kDistance) == 900;
+    r.Add(OperationKind::kDistanceChange).value = r.state.absolute ? 90.0 : 91.0;
+  }
+  if (r.code(kArcDistance) != kNoCode) {
+    r.state.arc_absolute = r.code(kArcDistance) == 901;
+  }
+  if (r.code(kReturnMode) != kNoCode) {
+    r.state.return_to_r = r.code(kReturnMode) == 990;
+  }
+  return true;
+}
+
+// ---- end of the block ----
+
+bool Calls(Reading& r) {
+  const int m = r.code(kCallWord);
+  if (m == kNoCode) {
+    return true;
+  }
+  if (m == 990) {
+    r.flow.leave = true;
+    return true;
+  }
+  const double p = r.block.has('P') ? r.block.Take('P') : -1.0;
+  if (!(p >= 0.0 && p < 1e9) || p != std::floor(p)) {
+    return r.FaultAt(kCallWord, "SUBPROGRAM_MISSING", "M98 needs P, the number of the subprogram");
+  }
+  const double l = r.block.has('L') ? r.block.Take('L') : 1.0;
+  if (!(l >= 0.0 && l <= kMostRepeats) || l != std::floor(l)) {
+    return r.FaultAt('L', "REPEATS_OUT_OF_RANGE", "L is a whole number, 0 … 9999");
+  }
+  r.flow = {true, false, std::to_string(static_cast<long>(p)), static_cast<int>(l)};
+  return true;
+}
+
+bool Stopping(Reading& r) {
+  switch (r.code(kStopping)) {
+    case 0:
+    case 10:
+      r.Add(OperationKind::kStop);
+      break;
+    case 20:
+    case 300:
+      EndProgram(r);
+      break;
+    default:
+      break;
+  }
+  return true;
+}
+
+void RefuseUnused(Reading& r) {
+  const std::uint32_t left = r.block.present & ~r.block.used;
+  if (left == 0) {
+    return;
+  }
+  const char letter = static_cast<char>('A' + std::countr_zero(left));
+  switch (letter) {
+    case 'U':
+    case 'V':
+    case 'W':
+      r.FaultAt(letter, "AXIS_NOT_DRIVEN", "this machine has no axes U, V and W");
+      break;
+    case 'S':
+    case 'T':
+    case 'H':
+      r.FaultAt(letter, "WORD_NOT_SUPPORTED", "a jet has no spindle speed and no tool numbers");
+      break;
+    default:
+      r.FaultAt(letter, "WORD_WITHOUT_USE", "no word of this line takes this one");
+  }
+}
+
+// An axis that the machine does not have.
+bool AxesDriven(Reading& r) {
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    const char letter = kAxisLetters[i];
+    if (!r.block.has(letter) || r.drives(i)) {
+      continue;
+    }
+    if (letter == 'Z' && r.options.leave_out_z) {
+      r.block.present &= ~LetterBit('Z');
+      continue;
+    }
+    return r.FaultAt(letter, "AXIS_NOT_DRIVEN",
+                     letter == 'Z'
+                         ? "this machine does not move Z; the reader can be told to leave Z words out"
+                         : "this machine does not move this axis");
+  }
+  return true;
+}
+
+// A line of nothing but axis words and a feed, in a straight motion that is on.
+bool Straight(const Reading& r) {
+  constexpr std::uint32_t kWords = LetterBit('X') | LetterBit('Y') | LetterBit('Z') | LetterBit('A') |
+                                   LetterBit('B') | LetterBit('C') | LetterBit('F');
+  return r.block.m_count == 0 && (r.block.present & ~kWords) == 0 &&
+         (r.block.g_count == 0
+              ? r.state.motion == 0 || r.state.motion == 10
+              : r.block.g_count == 1 && (r.block.g[0].tenfold == 0 || r.block.g[0].tenfold == 10));
+}
+
+void ObeyStraight(Reading& r) {
+  r.codes[kMotion] = kNoCode;
+  r.codes[kOnce] = kNoCode;
+  r.codes[kFeedMode] = kNoCode;
+  r.codes[kLength] = kNoCode;
+  if (r.block.g_count == 1) {
+    r.codes[kMotion] = r.block.g[0].tenfold;
+    r.columns[kMotion] = r.block.g[0].column;
+  }
+  if (!TakeFeed(r)) {
+    return;
+  }
+  SettleFeed(r);
+  ObeyMotion(r);
+}
+
+}  // namespace
+
+// Abrasive without water would only fill the tube.
+void SwitchJetOff(Reading& r) {
+  if (r.state.abrasive_on) {
+    r.Add(OperationKind::kAbrasiveOff);
+  }
+  r.Add(OperationKind::kJetOff);
+  r.state.jet_on = r.state.abrasive_on = false;
+}
+
+// The jet never stays on after the end, as LinuxCNC's M2 stops the spindle.
+void EndProgram(Reading& r) {
+  if (r.state.jet_on) {
+    SwitchJetOff(r);
+  }
+  r.Add(OperationKind::kEnd);
+  r.ended = true;
+}
+
+void ObeyBlock(Reading& r) {
+  if ((r.block.present & ~(LetterBit('X') | LetterBit('Y') | LetterBit('F'))) != 0 && !AxesDriven(r)) {
+    return;
+  }
+  if (Straight(r)) {
+    ObeyStraight(r);
+    return;
+  }
+  const bool good = SortCodes(r) && OneTakesP(r) && KerfAllows(r) && TakeFeed(r) && Outputs(r) && Jet(r) &&
+                    Abrasive(r) && MachineWords(r) && Dwell(r) && Plane(r) && Units(r) && Kerf(r) &&
+                    PathMode(r) && DistanceModes(r) && ChangeOffsets(r) && GoToReference(r) &&
+                    ObeyMotion(r) && Calls(r) && Stopping(r);
+  if (good) {
+    RefuseUnused(r);
+  }
+}
+
+}  // namespace lambdajet::trajectory
