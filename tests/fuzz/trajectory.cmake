@@ -1,0 +1,1 @@
+lambdajet_fuzz_target(gcode MUTATIONS 2000 DEPS trajectory_core)
