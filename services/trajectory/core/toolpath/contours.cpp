@@ -250,8 +250,9 @@ class ContourFinder {
     Index(options_.gap_mm);
     partner_.assign(ends_.size(), kNone);
     // Ends that are one point first, so that pieces shorter than the gap do not confuse what is near.
-    const bool branches = Pair(kSame_mm) | Pair(options_.gap_mm);
-    Walk(branches);
+    const bool at_once = Pair(kSame_mm);
+    const bool across_gaps = Pair(options_.gap_mm);
+    Walk(at_once || across_gaps);
   }
 
   // Joins free ends that have one other free end within reach; true if some have more.
