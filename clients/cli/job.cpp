@@ -387,7 +387,7 @@ void AddReading(CLI::App& noun, Output& output, const Connections& connections) 
   });
 }
 
-void AddResumeRetrace(CLI::App& noun, Output& output, const Connections& connections) {
+void AddResumeStopOverride(CLI::App& noun, Output& output, const Connections& connections) {
   auto resumed = std::make_shared<v1::ResumeJobRequest>();
   auto resumed_id = std::make_shared<std::string>();
   auto overlap = std::make_shared<std::optional<double>>();
@@ -409,28 +409,6 @@ void AddResumeRetrace(CLI::App& noun, Output& output, const Connections& connect
     output.Finish(status);
   });
 
-  auto retraced = std::make_shared<v1::RetraceJobRequest>();
-  auto retraced_id = std::make_shared<std::string>();
-  auto distance = std::make_shared<double>(0.0);
-  CLI::App* retrace =
-      noun.add_subcommand("retrace", "back up along the path while held; resume goes forward");
-  retrace->add_option("JOB", *retraced_id, "the job's id")->required();
-  retrace->add_option("MM", *distance, "how far back, mm")->required();
-  retrace->callback([retraced, retraced_id, distance, &output, &connections] {
-    retraced->set_job_id(*retraced_id);
-    retraced->set_distance_mm(*distance);
-    v1::RetraceJobResponse response;
-    const absl::Status status =
-        connections.Ask<CellService>("cell", &CellService::Stub::RetraceJob, *retraced, response);
-    if (status.ok()) {
-      PrintJob(response.job(), output);
-      output.Text(fmt::format("stands at {} mm", Fixed(response.s_mm(), 3)));
-    }
-    output.Finish(status);
-  });
-}
-
-void AddStopOverride(CLI::App& noun, Output& output, const Connections& connections) {
   auto stopped = std::make_shared<std::string>();
   CLI::App* stop =
       noun.add_subcommand("stop", "stop both modules on the path (category 1); latched until machine reset");
@@ -475,8 +453,7 @@ void AddJobVerbs(CLI::App& noun, Output& output, const Connections& connections)
                                                         &CellService::Stub::StartJob, output, connections);
   AddJobVerb<v1::HoldJobRequest, v1::HoldJobResponse>(noun, "hold", "feed hold on the path",
                                                       &CellService::Stub::HoldJob, output, connections);
-  AddResumeRetrace(noun, output, connections);
-  AddStopOverride(noun, output, connections);
+  AddResumeStopOverride(noun, output, connections);
   AddJobVerb<v1::CancelJobRequest, v1::CancelJobResponse>(noun, "cancel", "give up a job that is not running",
                                                           &CellService::Stub::CancelJob, output, connections);
   AddJobVerb<v1::GetJobRequest, v1::GetJobResponse>(noun, "show", "one job", &CellService::Stub::GetJob,

@@ -12,7 +12,7 @@
 #include "platform/machine_file/machine_file.hpp"
 #include "trajectory/core/feed/plan_program.hpp"
 #include "trajectory/core/feed/plan_samples.hpp"
-#include "trajectory/core/part_program/gcode_reader.hpp"
+#include "trajectory/core/part_program/read_program.hpp"
 
 namespace lambdajet::cli {
 namespace {
@@ -41,9 +41,10 @@ absl::Status Canon(const ProgramVerb& verb, Output& output) {
   if (!text.ok()) {
     return text.status();
   }
-  trajectory::GcodeOptions reading = verb.reading;
-  reading.axes = verb.axes == "xy" ? trajectory::kPlanarAxes : trajectory::kSixAxes;
-  const trajectory::PartProgram program = trajectory::ReadGcode(*text, reading);
+  trajectory::ReadOptions reading;
+  reading.gcode = verb.reading;
+  reading.gcode.axes = reading.cldata.axes = verb.axes == "xy" ? trajectory::kPlanarAxes : trajectory::kSixAxes;
+  const trajectory::PartProgram program = trajectory::ReadPartProgram(*text, reading);
   if (!program.faults.empty()) {
     TellFaults(verb.program, program.faults, output);
     return absl::OkStatus();
@@ -244,7 +245,7 @@ CLI::App* AddProgramVerb(CLI::App& noun, Output& output, const char* name, const
                          const std::shared_ptr<ProgramVerb>& verb,
                          absl::Status (*work)(const ProgramVerb&, Output&)) {
   CLI::App* app = noun.add_subcommand(name, what);
-  app->add_option("program", verb->program, "G-code file; - is standard input")->required();
+  app->add_option("program", verb->program, "G-code or CLDATA file; - is standard input")->required();
   app->callback([verb, work, &output] {
     if (const absl::Status status = work(*verb, output);
         !status.ok()) {  // faults have set their own exit code
@@ -297,6 +298,7 @@ void AddTrajectoryVerbs(CLI::App& noun, Output& output) {
   draw_app->add_option("--colour", draw->colour, "what the path's colour says")
       ->check(CLI::IsMember({"speed", "limit"}))
       ->capture_default_str();
+  AddCldataVerbs(noun, output);
 }
 
 }  // namespace lambdajet::cli

@@ -14,6 +14,7 @@ namespace lambdajet::cli {
 void AddKinematicsVerbs(CLI::App& noun, Output& output);
 void AddTrajectoryVerbs(CLI::App& noun, Output& output);
 void AddDrawingVerbs(CLI::App& noun, Output& output);
+void AddCldataVerbs(CLI::App& noun, Output& output);  // of the noun trajectory
 void AddCalibrationVerbs(CLI::App& noun, Output& output);
 void AddAccuracyVerbs(CLI::App& noun, Output& output);
 void AddInspectionVerbs(CLI::App& noun, Output& output);

@@ -1,1 +1,2 @@
-lambdajet_check(laws_trajectory_grinding LABELS laws SOURCES trajectory_idle_move_test.cpp DEPS trajectory_core)
+lambdajet_check(laws_trajectory_grinding LABELS laws SOURCES trajectory_idle_move_test.cpp trajectory_cldata_laws_test.cpp
+  trajectory_grinding_laws_test.cpp DEPS trajectory_core)

@@ -276,9 +276,6 @@ TEST_F(CellRpc, NamesTheJobThatDoesNotExistInEveryCall) {
                          grpc::ClientContext*, const Request&, Response*)) {
     Request request;
     Response response;
-    if constexpr (requires { request.set_distance_mm(1.0); }) {
-      request.set_distance_mm(1.0);
-    }
     request.set_job_id("job-999999");
     ExpectTrouble(cell->Ask(method, request, response), absl::StatusCode::kNotFound, "JOB_UNKNOWN");
     request.set_job_id("../etc");
@@ -287,7 +284,6 @@ TEST_F(CellRpc, NamesTheJobThatDoesNotExistInEveryCall) {
   check(&CellService::Stub::StartJob);
   check(&CellService::Stub::HoldJob);
   check(&CellService::Stub::ResumeJob);
-  check(&CellService::Stub::RetraceJob);
   check(&CellService::Stub::StopJob);
   check(&CellService::Stub::CancelJob);
   check(&CellService::Stub::GetJob);
@@ -456,28 +452,11 @@ TEST_F(CellRpc, HoldsResumesOverridesAndStops) {
   v1::HoldJobResponse held;
   ASSERT_TRUE(cell->Ask(&CellService::Stub::HoldJob, hold, held).ok());
   EXPECT_EQ(held.job().state(), v1::JOB_STATE_HELD);
-  v1::RetraceJobRequest back;
-  back.set_job_id(job_id);
-  v1::RetraceJobResponse backed;
-  for (const double distance_mm : {0.0, -1.0, 1001.0, std::nan("")}) {
-    back.set_distance_mm(distance_mm);
-    EXPECT_EQ(cell->Ask(&CellService::Stub::RetraceJob, back, backed).code(),
-              absl::StatusCode::kInvalidArgument);
-  }
-  back.set_distance_mm(0.5);
-  ASSERT_TRUE(cell->Ask(&CellService::Stub::RetraceJob, back, backed).ok());
-  EXPECT_EQ(backed.job().state(), v1::JOB_STATE_HELD);
-  const double stood_mm = backed.s_mm();
-  ASSERT_TRUE(cell->Ask(&CellService::Stub::RetraceJob, back, backed).ok());
-  EXPECT_NEAR(backed.s_mm(), stood_mm - 0.5, 1e-9);
-  EXPECT_EQ(backed.job().s_mm(), held.job().s_mm()) << "what was cut stays cut";
   v1::ResumeJobRequest resume;
   resume.set_job_id(job_id);
   v1::ResumeJobResponse resumed;
   ASSERT_TRUE(cell->Ask(&CellService::Stub::ResumeJob, resume, resumed).ok());
   EXPECT_EQ(resumed.job().state(), v1::JOB_STATE_RUNNING);
-  ExpectTrouble(cell->Ask(&CellService::Stub::RetraceJob, back, backed),
-                absl::StatusCode::kFailedPrecondition, "WRONG_JOB_STATE");
   v1::SetFeedOverrideRequest factor;
   factor.set_feed_override(0.5);
   v1::SetFeedOverrideResponse confirmed;

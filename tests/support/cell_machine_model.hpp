@@ -113,9 +113,6 @@ class MachineModel {
         module.mode = ModuleMode::kHeld;
         module.reason = ModuleReason::kCommanded;
         break;
-      case Verb::kRetrace:
-        view.drive->s_mm -= command.value;
-        break;
       case Verb::kResume:
         module.mode = ModuleMode::kRunning;
         module.reason = ModuleReason::kNone;

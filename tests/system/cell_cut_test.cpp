@@ -184,16 +184,6 @@ TEST_F(CellCut, HoldsAndGoesOn) {
   ASSERT_TRUE(status.ok()) << status;
   EXPECT_EQ(held.job().state(), v1::JOB_STATE_HELD);
   EXPECT_EQ(held.job().reason(), "COMMANDED");
-  v1::RetraceJobRequest back;
-  back.set_job_id(job_id);
-  back.set_distance_mm(2.0);
-  v1::RetraceJobResponse backed;
-  const absl::Status retraced = Ask(&CellService::Stub::RetraceJob, back, backed);
-  ASSERT_TRUE(retraced.ok()) << retraced;
-  EXPECT_EQ(backed.job().state(), v1::JOB_STATE_HELD);
-  const double stood_mm = backed.s_mm();
-  ASSERT_TRUE(Ask(&CellService::Stub::RetraceJob, back, backed).ok());
-  EXPECT_NEAR(backed.s_mm(), stood_mm - 2.0, 0.5);
   ASSERT_TRUE(Resume(job_id).ok());
   EXPECT_TRUE(Completes(job_id)) << Get(job_id).DebugString();
 }

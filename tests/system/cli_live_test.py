@@ -59,7 +59,6 @@ class EveryVerb(unittest.TestCase):
         cls.job, cls.plan = submitted["job_id"], submitted["plan_id"]
         for verb in ("hold", "resume"):
             shell.run("job", verb, cls.job, code=WRONG_STATE)
-        shell.run("job", "retrace", cls.job, 1, code=WRONG_STATE)
         shell.run("inspection", "begin", cls.plan)
         shell.run("job", "start", cls.job)
         cls.watched = shell.run("job", "watch", cls.job, code=(DONE, WRONG_STATE))

@@ -39,6 +39,12 @@ PURE = {
 K = "services/kinematics/core/"
 EXCEPTIONS = {
     "services/trajectory/core/idle_motion/idle_law.hpp: *": "the normalised law: stroke, time and derivatives from 0 to 1",
+    "services/trajectory/core/grinding/pilger_program.hpp: acceleration_jump": "a coordinate's unit by rad^2",
+    "services/trajectory/core/grinding/wheel_path.hpp: first": "a coordinate's unit by rad",
+    "services/trajectory/core/grinding/wheel_path.hpp: second": "a coordinate's unit by rad^2",
+    "services/trajectory/core/part_program/cldata_verification.hpp: size": "in the unit of what breaks",
+    "services/trajectory/core/part_program/cldata_verification.hpp: peak_first": "a coordinate's unit by the argument's",
+    "services/trajectory/core/part_program/cldata_verification.hpp: peak_second": "as peak_first, squared",
     "services/trajectory/core/feed/speed_profile.hpp: x": "the unknown of the equations it quotes, speed squared",
     "services/trajectory/core/feed/speed_profile.hpp: curvature": "1/mm, as in the equations it quotes",
     "services/foundation/geometry/homogeneous_chain.hpp: acceleration": "rad or mm, as its elementary matrix turns or shifts",

@@ -196,21 +196,6 @@ std::optional<Refusal> Conductor::Resume(const MachineView& machine, std::int64_
   return std::nullopt;
 }
 
-std::optional<Refusal> Conductor::Retrace(double distance_mm, const MachineView& machine,
-                                          std::int64_t now_ns) {
-  if (phase_ != Phase::kFollowing || !DriveHeard(machine, now_ns) ||
-      machine.drive->mode != ModuleMode::kHeld) {
-    return Refusal{"NOT_HELD", "the drive does not stand held on the path; hold, then back up"};
-  }
-  if (Waiting(kDriveTarget)) {
-    return Refusal{"MACHINE_BUSY", "another command is on its way to the drive; ask again"};
-  }
-  operator_command_ = true;
-  operator_trouble_.reset();
-  Send(kDriveTarget, Verb::kRetrace, now_ns, distance_mm);
-  return std::nullopt;
-}
-
 std::optional<Refusal> Conductor::Override(double factor, const MachineView& machine, std::int64_t now_ns) {
   if (!DriveHeard(machine, now_ns)) {
     return Refusal{"DRIVE_LOST", "drive is not heard; an override needs it"};

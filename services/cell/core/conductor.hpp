@@ -139,7 +139,6 @@ class Conductor {
                                std::int64_t now_ns);
   std::optional<Refusal> Hold(const MachineView& machine, std::int64_t now_ns);
   std::optional<Refusal> Resume(const MachineView& machine, std::int64_t now_ns);
-  std::optional<Refusal> Retrace(double distance_mm, const MachineView& machine, std::int64_t now_ns);
   std::optional<Refusal> Override(double factor, const MachineView& machine, std::int64_t now_ns);
   // Never refused.
   void Stop(std::int64_t now_ns);

@@ -408,38 +408,6 @@ absl::StatusOr<LiveJob> JobDesk::Hold(const std::string& job_id, double patience
   return now.ok() ? absl::StatusOr<LiveJob>(Live(*now)) : now.status();
 }
 
-absl::StatusOr<std::pair<LiveJob, double>> JobDesk::Retrace(const std::string& job_id, double distance_mm,
-                                                            double patience_s) {
-  Lock lock(mutex_);
-  const auto job = Current(job_id);
-  if (!job.ok()) {
-    return job.status();
-  }
-  if (job->progress.state != JobState::kHeld) {
-    return WrongState(*job, "HELD");
-  }
-  const auto at_rest = [&] { return !machine_.drive || machine_.drive->mode != ModuleMode::kHolding; };
-  WaitFor(lock, patience_s, at_rest);
-  if (const auto refusal = conductor_.Retrace(distance_mm, machine_, clock_.now_ns())) {
-    return Precondition(*refusal);
-  }
-  Carry(conductor_.TakeActions());
-  WaitFor(lock, patience_s, [&] { return !conductor_.operator_command_pending(); });
-  if (conductor_.operator_trouble()) {
-    return Precondition(*conductor_.operator_trouble());
-  }
-  const bool stands = WaitFor(lock, patience_s, at_rest);
-  const auto now = Current(job_id);
-  if (!now.ok()) {
-    return now.status();
-  }
-  if (!stands || !machine_.drive) {
-    return Trouble(absl::StatusCode::kDeadlineExceeded, "NOT_CONFIRMED",
-                   "the drive has not said in time that it stands again");
-  }
-  return std::pair(Live(*now), machine_.drive->s_mm);
-}
-
 absl::StatusOr<std::optional<LiveJob>> JobDesk::Stop(const std::string& job_id) {
   const Lock lock(mutex_);
   std::optional<Job> job;

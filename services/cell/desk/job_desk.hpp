@@ -104,9 +104,6 @@ class JobDesk {
   absl::StatusOr<LiveJob> Start(const std::string& job_id, double patience_s);
   absl::StatusOr<LiveJob> Hold(const std::string& job_id, double patience_s);
   absl::StatusOr<LiveJob> Resume(const std::string& job_id, double overlap_mm, double patience_s);
-  // And where the drive stands then.
-  absl::StatusOr<std::pair<LiveJob, double>> Retrace(const std::string& job_id, double distance_mm,
-                                                     double patience_s);
   absl::StatusOr<std::optional<LiveJob>> Stop(const std::string& job_id);
   absl::StatusOr<LiveJob> Cancel(const std::string& job_id);
   absl::StatusOr<double> Override(double factor, double patience_s);

@@ -20,8 +20,6 @@ constexpr double kLongestAdmissionWait_s = 10.0;
 constexpr double kLongestMachineWait_s = 120.0;
 constexpr double kAnswerMargin_s = 0.2;  // left of the deadline for the answer's way back
 constexpr double kLargestOverride = 1.2;
-constexpr double kSmallestRetrace_mm = 1e-3;
-constexpr double kLargestRetrace_mm = 1000.0;
 constexpr double kLargestOverlap_mm = 1000.0;
 constexpr int kDefaultPage = 20;
 constexpr int kLargestPage = 100;
@@ -101,26 +99,6 @@ grpc::ServerUnaryReactor* CellDoor::ResumeJob(grpc::CallbackServerContext* conte
         ArgumentChecks checks;
         checks.InRange("overlap_mm", overlap_mm, 0.0, kLargestOverlap_mm, "mm");
         return checks.ok() ? desk_.Resume(request->job_id(), overlap_mm, patience_s) : checks.status();
-      });
-}
-
-grpc::ServerUnaryReactor* CellDoor::RetraceJob(grpc::CallbackServerContext* context,
-                                               const v1::RetraceJobRequest* request,
-                                               v1::RetraceJobResponse* response) {
-  return AnswerJob(
-      context, request->job_id(), response,
-      [this, request, response](double patience_s) -> absl::StatusOr<LiveJob> {
-        ArgumentChecks checks;
-        checks.InRange("distance_mm", request->distance_mm(), kSmallestRetrace_mm, kLargestRetrace_mm, "mm");
-        if (!checks.ok()) {
-          return checks.status();
-        }
-        const auto retraced = desk_.Retrace(request->job_id(), request->distance_mm(), patience_s);
-        if (!retraced.ok()) {
-          return retraced.status();
-        }
-        response->set_s_mm(retraced->second);
-        return retraced->first;
       });
 }
 

@@ -34,9 +34,6 @@ class CellDoor final : public v1::CellService::CallbackService {
   grpc::ServerUnaryReactor* ResumeJob(grpc::CallbackServerContext* context,
                                       const v1::ResumeJobRequest* request,
                                       v1::ResumeJobResponse* response) override;
-  grpc::ServerUnaryReactor* RetraceJob(grpc::CallbackServerContext* context,
-                                       const v1::RetraceJobRequest* request,
-                                       v1::RetraceJobResponse* response) override;
   grpc::ServerUnaryReactor* StopJob(grpc::CallbackServerContext* context, const v1::StopJobRequest* request,
                                     v1::StopJobResponse* response) override;
   grpc::ServerUnaryReactor* CancelJob(grpc::CallbackServerContext* context,

@@ -7,7 +7,7 @@
 #include "platform/rpc/argument_checks.hpp"
 #include "platform/rpc/handlers.hpp"
 #include "platform/rpc/streams.hpp"
-#include "trajectory/core/part_program/gcode_reader.hpp"
+#include "trajectory/core/part_program/read_program.hpp"
 #include "trajectory/rpc/wire.hpp"
 
 namespace lambdajet::trajectory {
@@ -221,7 +221,7 @@ grpc::ServerUnaryReactor* TrajectoryRpc::ListOperations(grpc::CallbackServerCont
     if (const absl::Status status = CheckProgram(request->program()); !status.ok()) {
       return status;
     }
-    const PartProgram program = ReadGcode(request->program());
+    const PartProgram program = ReadPartProgram(request->program());
     for (const ProgramFault& fault : program.faults) {
       ToWire(fault, *response->add_faults());
     }

@@ -9,7 +9,7 @@
 #include "trajectory/core/feed/reach.hpp"
 #include "trajectory/core/feed/resume.hpp"
 #include "trajectory/core/feed/stretch.hpp"
-#include "trajectory/core/part_program/gcode_reader.hpp"
+#include "trajectory/core/part_program/read_program.hpp"
 
 namespace lambdajet::trajectory {
 namespace {
@@ -51,13 +51,13 @@ PathDefaults DefaultsOf(const MachineDescription& machine, const PlanOptions& op
   return d;
 }
 
-GcodeOptions ReaderOptionsOf(const MachineDescription& machine) {
-  GcodeOptions options;
-  options.default_tolerance_mm = machine.path.corner_tolerance_mm;
-  options.kerf_width_mm = machine.process.kerf_width_mm;
-  options.kerf_compensation =
-      false;  // the planner moves no contour; marked motions would be cut where they are written
-  options.fault_limit = kFaultLimit;
+ReadOptions ReaderOptionsOf(const MachineDescription& machine) {
+  ReadOptions options;
+  options.compensate_kerf = true;
+  options.gcode.default_tolerance_mm = machine.path.corner_tolerance_mm;
+  options.gcode.kerf_width_mm = machine.process.kerf_width_mm;
+  options.gcode.kerf_compensation = false;  // refused: its corners are not proven with this planner yet
+  options.gcode.fault_limit = options.cldata.fault_limit = kFaultLimit;
   return options;
 }
 
@@ -350,7 +350,7 @@ PlannedProgram PlanPartProgram(std::string_view program, const MachineDescriptio
   if (!result.faults.empty()) {
     return result;
   }
-  PartProgram read = ReadGcode(program, ReaderOptionsOf(machine));
+  PartProgram read = ReadPartProgram(program, ReaderOptionsOf(machine));
   result.faults = std::move(read.faults);
   if (!result.faults.empty()) {
     return result;
@@ -382,7 +382,7 @@ Admission AdmitPartProgram(std::string_view program, const MachineDescription& m
                            const PlanOptions& options) {
   Admission admission;
   admission.faults = OptionFaults(options);
-  PartProgram read = ReadGcode(program, ReaderOptionsOf(machine));
+  PartProgram read = ReadPartProgram(program, ReaderOptionsOf(machine));
   admission.faults.insert(admission.faults.end(), read.faults.begin(), read.faults.end());
   if (!admission.faults.empty()) {
     return admission;

@@ -1,0 +1,15 @@
+#include "trajectory/core/part_program/read_program.hpp"
+
+#include <utility>
+
+#include "trajectory/core/toolpath/kerf.hpp"
+
+namespace lambdajet::trajectory {
+PartProgram ReadPartProgram(std::string_view text, const ReadOptions& options) {
+  const bool cldata = options.notation == ProgramNotation::kCldata ||
+                      (options.notation == ProgramNotation::kByContent && LooksLikeCldata(text));
+  PartProgram program = cldata ? ReadCldata(text, options.cldata) : ReadGcode(text, options.gcode);
+  return options.compensate_kerf && program.faults.empty() ? CompensateKerf(std::move(program)) : program;
+}
+
+}  // namespace lambdajet::trajectory

@@ -1,0 +1,26 @@
+// Reads a part program in whatever notation it is written: G-code or CLDATA.
+//
+// Model: the first statement tells: a word of CLDATA ("PARTNO", "GOTO/…", "$$") or else G-code. Both readers give the same
+// canonical operations, so everything behind them is the same.
+// Threads: pure. Errors: the readers' faults, and those of the kerf's compensation.
+#pragma once
+
+#include <string_view>
+
+#include "trajectory/core/part_program/cldata_reader.hpp"
+#include "trajectory/core/part_program/gcode_reader.hpp"
+
+namespace lambdajet::trajectory {
+
+enum class ProgramNotation : std::uint8_t { kByContent, kGcode, kCldata };
+
+struct ReadOptions {
+  ProgramNotation notation = ProgramNotation::kByContent;
+  GcodeOptions gcode;
+  CldataOptions cldata;
+  bool compensate_kerf = false;  // move the path by the kerf offset that the program asks for (core/toolpath/kerf)
+};
+
+PartProgram ReadPartProgram(std::string_view text, const ReadOptions& options = {});
+
+}  // namespace lambdajet::trajectory

@@ -1,0 +1,1 @@
+lambdajet_fuzz_target(cldata MUTATIONS 3000 DEPS trajectory_core)

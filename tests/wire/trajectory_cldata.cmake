@@ -1,0 +1,1 @@
+lambdajet_check(wire_trajectory_cldata LABELS wire SOURCES trajectory_cldata_wrong_programs_test.cpp DEPS trajectory_core)
