@@ -34,14 +34,6 @@ struct SpatialFiles {
   PlannedSpatialProgram planned;
 };
 
-// A reader that knows no axes but X and Y refuses the others by name.
-template <class Options>
-void ForSixAxes(Options& options) {
-  if constexpr (requires { options.axes; }) {
-    options.axes = trajectory::kSixAxes;
-  }
-}
-
 // The plan; nothing after the program's faults were told.
 absl::StatusOr<std::optional<SpatialFiles>> PlanFiles(const SpatialVerb& verb, Output& output) {
   const auto text = ReadTextFile(verb.program);
@@ -50,7 +42,7 @@ absl::StatusOr<std::optional<SpatialFiles>> PlanFiles(const SpatialVerb& verb, O
     return text.ok() ? machine.status() : text.status();
   }
   trajectory::GcodeOptions reading;
-  ForSixAxes(reading);
+  reading.axes = trajectory::kSixAxes;
   reading.default_tolerance_mm = machine->motion.corner_tolerance_mm;
   reading.kerf_compensation = false;  // the planner moves no contour
   const trajectory::PartProgram program = trajectory::ReadGcode(*text, reading);

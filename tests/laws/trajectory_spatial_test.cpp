@@ -2,10 +2,14 @@
 #include <gtest/gtest.h>
 
 #include <cstdio>
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
 #include <string>
 
 #include "tests/laws/trajectory_spatial_cases.hpp"
 #include "tests/laws/trajectory_spatial_reference.hpp"
+#include "trajectory/core/part_program/gcode_reader.hpp"
 
 namespace lambdajet::trajectory {
 namespace {
@@ -376,6 +380,32 @@ TEST(DrillingCycle, FeedsAlongTheTiltedAxisAndDwellsAtItsBottom) {
     }
   }
   EXPECT_NEAR(deepest, -12.0, 1e-9);
+}
+
+// The shipped program: its cycles, read as G-code writes them, drill along the tool, and the whole of it can be planned.
+TEST(DrillingCycle, OfTheShippedProgramFollowTheToolsTilt) {
+  const char* folder = std::getenv("LAMBDAJET_SOURCE_DIR");
+  std::ifstream file(std::string(folder) + "/deploy/parts/tilted_holes/tilted_holes.ngc");
+  const std::string text{std::istreambuf_iterator<char>(file), {}};
+  GcodeOptions options;
+  options.axes = kSixAxes;
+  options.kerf_compensation = false;
+  const PartProgram program = ReadGcode(text, options);
+  ASSERT_TRUE(program.faults.empty()) << program.faults[0].message;
+  int bottoms = 0;
+  for (std::size_t i = 1; i < program.operations.size(); ++i) {
+    const Operation& above = program.operations[i - 1];
+    const Operation& at = program.operations[i];
+    if (at.kind != OperationKind::kFeedLine || above.kind != OperationKind::kTraverse || at.line > 28) {
+      continue;
+    }
+    const Vector3d way(at.x_W_mm - above.x_W_mm, at.y_W_mm - above.y_W_mm, at.z_W_mm - above.z_W_mm);
+    EXPECT_LE((way.normalized() + RotationOf(at) * Vector3d::UnitZ()).norm(), 1e-9) << "line " << at.line;
+    ++bottoms;
+  }
+  EXPECT_GE(bottoms, 9);
+  const PlannedSpatialProgram planned = PlanOf(program.operations);
+  EXPECT_TRUE(planned.faults.empty()) << FaultText(planned);
 }
 
 }  // namespace

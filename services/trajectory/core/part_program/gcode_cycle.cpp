@@ -1,8 +1,10 @@
-// Drilling cycles G81, G82 and G83 along Z, with the repeats and return levels of LinuxCNC.
+// Drilling cycles G81, G82 and G83 along the tool, upright or tilted, with the repeats and return levels of LinuxCNC.
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 #include "trajectory/core/part_program/gcode_reading.hpp"
+#include "trajectory/core/spatial_feed/drilling_cycle.hpp"
 
 namespace lambdajet::trajectory {
 namespace {
@@ -165,7 +167,9 @@ class Drilling {
 }  // namespace
 
 bool ObeyCycle(Reading& r) {
+  const std::size_t first = r.program.operations.size();
   const bool good = Drilling(r).Obey();
+  AlignWithTool(std::span(r.program.operations).subspan(first), r.state.zero[kZ]);
   r.state.cycle.motion = r.state.motion;
   return good;
 }
