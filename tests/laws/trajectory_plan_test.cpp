@@ -338,6 +338,38 @@ TEST(PlanLaws, SameInputsSamePlan) {
   EXPECT_NE(PlanPartProgram(text, m, other).plan.id, a.plan.id);
 }
 
+// G41 and G42 move the cut off the programmed contour by half the machine's kerf, to the tolerance of the path.
+TEST(PlanLaws, ProgrammedKerfIsKept) {
+  const MachineDescription m = DemoLikeMachine();
+  const double half_mm = 0.5 * m.process.kerf_width_mm;
+  // Clockwise from the left edge's middle: the outside is on the left.
+  const std::string contour =
+      "G1 Y180\nG1 X200\nG2 X220 Y160 I0 J-20\nG1 Y100\nG1 X100\nG1 Y141\nG40 G1 X92\nM5\nM2\n";
+  for (const auto& [word, side] : {std::pair{"G41", 1.0}, std::pair{"G42", -1.0}}) {
+    SCOPED_TRACE(word);
+    const std::string text =
+        std::string("G21 G90 F2400\nG0 X90 Y140\nM3 P0.6\n") + word + " G1 X100\n" + contour;
+    const PlannedProgram plan = PlanPartProgram(text, m, {});
+    ASSERT_TRUE(plan.faults.empty()) << plan.faults[0].reason << " " << plan.faults[0].message;
+    int on_edges = 0;
+    int on_arc = 0;
+    for (const PlanSample& s : plan.samples) {
+      const Eigen::Vector2d p(s.x_W_mm, s.y_W_mm);
+      const Eigen::Vector2d arm = p - Eigen::Vector2d(200.0, 160.0);
+      if (p.x() > 150.0 && p.x() < 199.0) {
+        EXPECT_NEAR(p.y() > 140.0 ? p.y() - 180.0 : 100.0 - p.y(), half_mm * side,
+                    m.path.corner_tolerance_mm);
+        ++on_edges;
+      } else if (arm.x() > 1.0 && arm.y() > 1.0) {
+        EXPECT_NEAR(arm.norm() - 20.0, half_mm * side, m.path.corner_tolerance_mm);
+        ++on_arc;
+      }
+    }
+    EXPECT_GT(on_edges, 300);
+    EXPECT_GT(on_arc, 50);
+  }
+}
+
 // Against a speed that no plan can exceed; 1 ms knots, as the loop that plays them.
 TEST(FeedLaw, ShortBlocksHoldTheFeed) {
   const MachineDescription m = DemoLikeMachine();

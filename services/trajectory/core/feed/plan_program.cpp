@@ -56,7 +56,6 @@ ReadOptions ReaderOptionsOf(const MachineDescription& machine) {
   options.compensate_kerf = true;
   options.gcode.default_tolerance_mm = machine.path.corner_tolerance_mm;
   options.gcode.kerf_width_mm = machine.process.kerf_width_mm;
-  options.gcode.kerf_compensation = false;  // refused: its corners are not proven with this planner yet
   options.gcode.fault_limit = options.cldata.fault_limit = kFaultLimit;
   return options;
 }
