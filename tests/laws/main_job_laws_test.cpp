@@ -1,6 +1,8 @@
 // A slice of twenty plants: the whole main job on random machines keeps its promises.
 #include <gtest/gtest.h>
 
+#include <cstdio>
+
 #include "platform/machine_file/machine_file.hpp"
 #include "simulated_plant/plant_file/plant_file.hpp"
 #include "tests/support/child_process.hpp"
@@ -46,6 +48,30 @@ TEST(MainJob, TheShippedMachineStartsWhereThePaperSays) {
   EXPECT_LE(trial.cut(TrialStage::kSetUp).p95_mm, 0.82);
   EXPECT_LE(trial.cut(TrialStage::kIdentified).p95_mm, 0.45);
   EXPECT_LE(trial.cut(TrialStage::kCompensated).p95_mm, 0.12);
+}
+
+// Feed from tolerance is judged by inspection: the part that the drawn machine really cuts is within what was asked.
+TEST(MainJob, CutsWithinTheToleranceAskedFor) {
+  constexpr double kIdentified_mm = 0.3, kCompensated_mm = 0.12;
+  const auto machine = ReadMachineFile(test::SourceDir() + "/deploy/config/machine.yaml");
+  ASSERT_TRUE(machine.ok());
+  const TrialPart part = PlateWithHoles(machine->process.kerf_width_mm, machine->path.feed_mm_per_s);
+  for (const std::uint64_t seed : {2, 3}) {
+    const PlantTrial trial = RunToleranceTrial(*machine, part, seed, kIdentified_mm, kCompensated_mm);
+    ASSERT_TRUE(trial.trouble.empty()) << trial.trouble;
+    const CutResult& identified = trial.cut(TrialStage::kIdentified);
+    const CutResult& compensated = trial.cut(TrialStage::kCompensated);
+    std::printf(
+        "seed %d: asked %.2f found %.4f mm in %.1f s (limits alone %.1f s), asked %.2f found %.4f mm in %.1f "
+        "s (%.1f s)\n",
+        static_cast<int>(seed), kIdentified_mm, identified.p95_mm, identified.planned_s, identified.fastest_s,
+        kCompensated_mm, compensated.p95_mm, compensated.planned_s, compensated.fastest_s);
+    EXPECT_LE(identified.p95_mm, kIdentified_mm);
+    EXPECT_LE(compensated.p95_mm, kCompensated_mm);
+    EXPECT_LE(identified.promised_95_mm, kIdentified_mm);
+    EXPECT_LE(compensated.promised_95_mm, kCompensated_mm);
+    EXPECT_EQ(identified.not_cut + compensated.not_cut, 0u);
+  }
 }
 
 TEST(MainJob, IsTheSameBitByBit) {

@@ -1,1 +1,3 @@
 lambdajet_check(laws_trajectory LABELS laws TIMEOUT 300 SOURCES trajectory_plan_test.cpp DEPS trajectory_core)
+lambdajet_check(laws_trajectory_tolerance LABELS laws TIMEOUT 300 SOURCES trajectory_tolerance_test.cpp
+                DEPS trajectory_tolerance)

@@ -244,7 +244,7 @@ TEST_F(CellRpc, RefusesWishesThatAreNotAsTheyMustBeAndStoresNothing) {
   ExpectTrouble(Submit(Wish(std::string(129, 'a'))), kInvalid, "BAD_ID");
   ExpectTrouble(Submit(Wish("empty", "")), kInvalid, "EMPTY");
   ExpectTrouble(Submit(Wish("utf8", "G1 X1 (\xff\xfe)\n")), kInvalid, "NOT_UTF8");
-  ExpectTrouble(Submit(Wish("large", std::string((8U << 20U) + 1, ' '))), kInvalid, "TOO_LARGE");
+  ExpectTrouble(Submit(Wish("large", std::string((8U << 20U) + 1, ' '))), kInvalid, "PROGRAM_TOO_LARGE");
   auto wish = Wish("name");
   wish.set_name(std::string(200, 'n'));
   ExpectTrouble(Submit(wish), kInvalid, "TOO_LARGE");
@@ -257,10 +257,10 @@ TEST_F(CellRpc, RefusesWishesThatAreNotAsTheyMustBeAndStoresNothing) {
   EXPECT_EQ(JobCount(), 0);
 }
 
-TEST_F(CellRpc, RefusesAHundredMebibytesBeforeTheyAreRead) {
+TEST_F(CellRpc, RefusesAHundredMebibytesWithItsOwnReason) {
   const absl::Status status = Submit(Wish("huge", std::string(100U << 20U, 'G')));
-  EXPECT_EQ(status.code(), absl::StatusCode::kResourceExhausted) << status;
-  EXPECT_FALSE(TroubleReason(status).empty());
+  EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument) << status;
+  EXPECT_EQ(TroubleReason(status), "PROGRAM_TOO_LARGE");
   EXPECT_EQ(JobCount(), 0);
 }
 

@@ -12,7 +12,7 @@
 #include "platform/process/atomic_file.hpp"
 #include "simulated_plant/core/nominal_plant.hpp"
 #include "tests/support/virtual_cell.hpp"
-#include "trajectory/core/feed/plan_program.hpp"
+#include "trajectory/core/tolerance/plan_to_tolerance.hpp"
 
 namespace lambdajet::tests {
 namespace {
@@ -177,6 +177,13 @@ class Trial {
     return std::move(trial_);
   }
 
+  PlantTrial RunToTolerances(double identified_mm, double compensated_mm) {
+    if (Identify() && Cut(TrialStage::kIdentified, false, identified_mm)) {
+      Cut(TrialStage::kCompensated, true, compensated_mm);
+    }
+    return std::move(trial_);
+  }
+
  private:
   static CellOptions OptionsOf(std::uint64_t seed) {
     CellOptions options;
@@ -189,10 +196,14 @@ class Trial {
     return false;
   }
 
-  bool Cut(TrialStage stage, bool compensate) {
+  bool Cut(TrialStage stage, bool compensate, double tolerance_mm = 0.0) {
     trajectory::PlanOptions options;
     options.compensate = compensate;
-    const PlannedProgram planned = trajectory::PlanPartProgram(part_.program, machine_, options);
+    if (tolerance_mm > 0.0) {
+      options.hold.push_back({tolerance_mm});
+    }
+    const trajectory::TolerancePlan answer = PlanToTolerance(part_.program, machine_, options);
+    const PlannedProgram& planned = answer.planned;
     if (!planned.faults.empty()) {
       return Refuse(FirstFault(planned));
     }
@@ -201,6 +212,11 @@ class Trial {
     result.predicted_95_mm = prediction.predicted_95_mm;
     result.predicted_95_linear_mm = prediction.predicted_95_linear_mm;
     result.expected_95_mm = prediction.expected_95_mm;
+    for (const trajectory::HeldTolerance& held : answer.report.held) {
+      result.promised_95_mm = std::max(result.promised_95_mm, held.predicted_95_mm);
+    }
+    result.planned_s = planned.plan.duration_s;
+    result.fastest_s = answer.report.fastest_s;
     result.largest_source =
         prediction.budget.empty() ? "" : std::string(accuracy::SourceName(prediction.budget[0].source));
     const CellRun run = cell_.Run(planned.plan);
@@ -287,6 +303,12 @@ absl::StatusOr<TrialPart> ReadTrialPart(const std::string& stem) {
 PlantTrial RunTrial(const MachineDescription& as_designed, const simulated_plant::PlantTruth& truth,
                     const TrialPart& part, std::uint64_t seed) {
   return Trial(as_designed, truth, part, seed).Run();
+}
+
+PlantTrial RunToleranceTrial(const MachineDescription& as_designed, const TrialPart& part, std::uint64_t seed,
+                             double identified_mm, double compensated_mm) {
+  return Trial(as_designed, simulated_plant::RandomPlant(as_designed, seed), part, seed)
+      .RunToTolerances(identified_mm, compensated_mm);
 }
 
 PlantTrial RunTrial(const MachineDescription& as_designed, const TrialPart& part, std::uint64_t seed) {

@@ -37,6 +37,9 @@ struct CutResult {
   double predicted_95_mm = 0.0;
   double predicted_95_linear_mm = 0.0;
   double expected_95_mm = 0.0;
+  double promised_95_mm = 0.0;  // with feed from tolerance: largest of its contours'
+  double planned_s = 0.0;       // program time
+  double fastest_s = 0.0;       // with feed from tolerance: as the limits alone allow
   double cutting_time_s = 0.0;
   double event_p99_mm = 0.0;
   std::uint32_t not_cut = 0;
@@ -61,6 +64,10 @@ struct PlantTrial {
 
   const CutResult& cut(TrialStage stage) const { return cuts[static_cast<std::size_t>(stage)]; }
 };
+
+// The same with feed from tolerance: cut identified to one tolerance and compensated to another; nothing is cut as set up.
+PlantTrial RunToleranceTrial(const MachineDescription& as_designed, const TrialPart& part, std::uint64_t seed,
+                             double identified_mm, double compensated_mm);
 
 // On this machine; `seed` is that of its noise.
 PlantTrial RunTrial(const MachineDescription& as_designed, const simulated_plant::PlantTruth& truth,

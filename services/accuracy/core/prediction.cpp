@@ -39,10 +39,7 @@ Deflections SpringSlope(const ContourModel& model, double lag_step_s2, double da
   return slope;
 }
 
-struct PointErrors {
-  std::vector<std::array<double, kSourceCount>> bias_mm;
-  std::vector<std::array<double, kSourceCount>> variance_mm2;
-};
+}  // namespace
 
 PointErrors PropagateLinearly(const ContourModel& model) {
   const ErrorChain& chain = model.chain;
@@ -68,6 +65,8 @@ PointErrors PropagateLinearly(const ContourModel& model) {
   }
   return errors;
 }
+
+namespace {
 
 double Sum(const std::array<double, kSourceCount>& values) {
   double sum = 0.0;
@@ -178,12 +177,6 @@ double OrderStatistic(std::vector<double>& values, double rank) {
   const auto at = static_cast<std::ptrdiff_t>(std::clamp(std::ceil(rank) - 1.0, 0.0, last));
   std::ranges::nth_element(values, values.begin() + at);
   return values[static_cast<std::size_t>(at)];
-}
-
-// The quantile's upper limit with 95 % confidence, free of any distribution.
-double UpperQuantile(std::vector<double>& values, double fraction) {
-  const double n = static_cast<double>(values.size());
-  return OrderStatistic(values, n * fraction + 1.6448536 * std::sqrt(n * fraction * (1.0 - fraction)));
 }
 
 double ShareWithin(const std::vector<double>& values, double tolerance_mm) {
@@ -312,6 +305,11 @@ std::string_view Name(PredictionReason reason) {
       "UNKNOWN", "PREDICTED", "NO_CUTTING", "NOT_FINITE", "OUT_OF_ORDER", "UNREACHABLE", "CANCELLED"};
   const auto i = static_cast<std::size_t>(reason);
   return i < kNames.size() ? kNames[i] : kNames[0];
+}
+
+double UpperQuantile(std::vector<double>& values, double fraction) {
+  const double n = static_cast<double>(values.size());
+  return OrderStatistic(values, n * fraction + 1.6448536 * std::sqrt(n * fraction * (1.0 - fraction)));
 }
 
 double WeightedPercentile(std::vector<WeightedValue>& values, double fraction) {

@@ -150,6 +150,16 @@ void PlaySpring(const ContourModel& model, double elastic_lag_s2, double damping
 ContourPrediction Predict(const MachineDescription& machine, std::span<const PlanSample> samples,
                           bool compensated, const PredictionOptions& options = {});
 
+// Bias and variance of each point by source, first order; elements of a point are ordered as Source.
+struct PointErrors {
+  std::vector<std::array<double, kSourceCount>> bias_mm;
+  std::vector<std::array<double, kSourceCount>> variance_mm2;
+};
+PointErrors PropagateLinearly(const ContourModel& model);
+
+// The quantile's upper limit with 95 % confidence, free of any distribution. Reorders.
+double UpperQuantile(std::vector<double>& values, double fraction);
+
 // The value below which `fraction` of the weight lies; 0 if there is none. Reorders.
 double WeightedPercentile(std::vector<WeightedValue>& values, double fraction);
 

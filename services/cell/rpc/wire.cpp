@@ -85,7 +85,12 @@ absl::StatusOr<Submission> FromWire(const v1::SubmitJobRequest& request) {
                              kLongestId));
   checks.Text("name", request.name(), kLongestName_bytes);
   checks.NonEmpty("program", request.program());
-  checks.Text("program", request.program(), kLargestProgram_bytes);
+  checks.Require(request.program().size() <= kLargestProgram_bytes, "program", "PROGRAM_TOO_LARGE",
+                 fmt::format("the program has {} bytes; at most {} are taken", request.program().size(),
+                             kLargestProgram_bytes));
+  if (checks.ok()) {
+    checks.Text("program", request.program(), kLargestProgram_bytes);
+  }
   if (request.has_feed_scale()) {
     checks.Positive("feed_scale", request.feed_scale());
     checks.InRange("feed_scale", request.feed_scale(), 0.0, kLargestFeedScale);

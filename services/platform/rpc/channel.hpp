@@ -29,7 +29,7 @@ struct ChannelOptions {
   std::string certificate_file = {};  // our own, for mTLS
   std::string key_file = {};
   std::string server_name = {};  // in the server's certificate, if not the address
-  int most_message_mib = 16;
+  int most_message_mib = 128;
 };
 
 absl::StatusOr<std::shared_ptr<grpc::Channel>> OpenChannel(const ChannelOptions& options);

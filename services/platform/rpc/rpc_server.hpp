@@ -31,7 +31,7 @@ struct RpcOptions {
   std::string client_ca_file;           // PEM; empty: clients need no certificate
   bool allow_plaintext = false;         // beyond loopback
   bool reflection = false;
-  int most_message_mib = 16;
+  int most_message_mib = 128;  // so that a program too large for its house is refused by it, with its reason
   int most_metadata_kib = 8;
   int most_memory_mib = 256;
   int most_streams = 200;            // at once, on one connection

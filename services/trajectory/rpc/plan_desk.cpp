@@ -61,11 +61,13 @@ void PlanDesk::Work(const std::shared_ptr<PlanRecord>& record) {
   const auto begin = std::chrono::steady_clock::now();
   auto planned = std::make_shared<PlannedProgram>();
   if (!record->cancel) {
-    *planned =
-        PlanPartProgram(record->program, *record->machine, record->options, [&record](double progress) {
+    TolerancePlan answer =
+        PlanToTolerance(record->program, *record->machine, record->options, [&record](double progress) {
           record->progress = 0.9 * progress;
           return !record->cancel;
         });
+    *planned = std::move(answer.planned);
+    record->tolerance = std::move(answer.report);
   }
   if (planned->faults.empty() && !record->cancel) {
     record->predicted_95_mm = PredictedBound(*record->machine, *planned, record->cancel);
@@ -75,7 +77,11 @@ void PlanDesk::Work(const std::shared_ptr<PlanRecord>& record) {
   const bool done = planned->faults.empty();
   record->planned = std::move(planned);
   record->progress = 1.0;
-  record->state = record->cancel ? PlanState::kCancelled : done ? PlanState::kDone : PlanState::kFailed;
+  {
+    const std::lock_guard lock(mutex_);
+    record->state = record->cancel ? PlanState::kCancelled : done ? PlanState::kDone : PlanState::kFailed;
+  }
+  ended_.notify_all();
   (done ? plans_done_ : plans_failed_).Increment();
   planning_time_.Observe(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
 }
@@ -109,6 +115,12 @@ std::shared_ptr<const PlanRecord> PlanDesk::Cancel(std::uint64_t id) {
     }
   }
   return nullptr;
+}
+
+bool PlanDesk::Await(const PlanRecord& record, double most_s) const {
+  std::unique_lock lock(mutex_);
+  return ended_.wait_for(lock, std::chrono::duration<double>(most_s),
+                         [&record] { return record.state != PlanState::kRunning; });
 }
 
 std::vector<std::shared_ptr<const PlanRecord>> PlanDesk::List() const {

@@ -6,6 +6,7 @@
 #pragma once
 
 #include <atomic>
+#include <condition_variable>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -17,7 +18,7 @@
 #include "foundation/machine/machine_description.hpp"
 #include "platform/rpc/work_pool.hpp"
 #include "platform/telemetry/metrics.hpp"
-#include "trajectory/core/feed/plan_program.hpp"
+#include "trajectory/core/tolerance/plan_to_tolerance.hpp"
 
 namespace lambdajet::trajectory {
 
@@ -34,6 +35,7 @@ struct PlanRecord {
   std::atomic<double> progress = 0.0;
   std::atomic<bool> cancel = false;
   std::shared_ptr<const PlannedProgram> planned;
+  ToleranceReport tolerance;
   double predicted_95_mm = 0.0;
 };
 
@@ -47,6 +49,8 @@ class PlanDesk {
                                                           std::shared_ptr<const MachineDescription> machine);
   std::shared_ptr<const PlanRecord> Find(std::uint64_t id) const;  // null: not known
   std::shared_ptr<const PlanRecord> Cancel(std::uint64_t id);
+  // Waits until the plan is no longer running, at most so long; true if it is not.
+  bool Await(const PlanRecord& record, double most_s) const;
   std::vector<std::shared_ptr<const PlanRecord>> List() const;  // newest first
   void KeepFor(std::uint64_t id);                               // this one is being streamed; 0 none
   void CancelAll();
@@ -56,6 +60,7 @@ class PlanDesk {
   void GiveUpOldest();
 
   mutable std::mutex mutex_;
+  mutable std::condition_variable ended_;
   std::vector<std::shared_ptr<PlanRecord>> records_;
   std::uint64_t numbers_ = 0;
   std::uint64_t kept_ = 0;

@@ -8,6 +8,8 @@
 #include "platform/rpc/handlers.hpp"
 #include "platform/rpc/streams.hpp"
 #include "trajectory/core/part_program/read_program.hpp"
+#include "trajectory/rpc/admission.hpp"
+#include "trajectory/rpc/program_streams.hpp"
 #include "trajectory/rpc/wire.hpp"
 
 namespace lambdajet::trajectory {
@@ -19,6 +21,7 @@ constexpr std::size_t kMostListedOperations = 200000;
 constexpr int kPointsPerBatch = 2000;
 constexpr double kDefaultStep_s = 0.004;
 constexpr int kDefaultPage = 20;
+constexpr std::size_t kMostStepsWaiting = 64;
 
 absl::Status UnknownPlan(std::uint64_t id) {
   return Trouble(
@@ -37,7 +40,10 @@ TrajectoryRpc::TrajectoryRpc(FindMachine find_machine, Streaming streaming, Plan
     : find_machine_(std::move(find_machine)),
       streaming_(std::move(streaming)),
       desk_(desk),
-      pool_(kThreads, kMostWaiting) {}
+      pool_(kThreads, kMostWaiting),
+      admissions_(kThreads, kMostWaiting) {}
+
+TrajectoryRpc::~TrajectoryRpc() { closing_ = true; }
 
 absl::StatusOr<std::shared_ptr<const MachineDescription>> TrajectoryRpc::MachineFor(
     const v1::PlanOptions& options) const {
@@ -81,15 +87,7 @@ absl::Status TrajectoryRpc::Admit(const v1::AdmitProgramRequest& request,
   if (!options.ok() || !machine.ok()) {
     return options.ok() ? machine.status() : options.status();
   }
-  const Admission admission = AdmitPartProgram(request.program(), **machine, *options);
-  response.set_admitted(admission.faults.empty());
-  for (const ProgramFault& fault : admission.faults) {
-    ToWire(fault, *response.add_faults());
-  }
-  ToWire(**machine, *response.mutable_model_version());
-  response.set_cutting_length_mm(admission.cutting_length_mm);
-  response.set_idle_length_mm(admission.idle_length_mm);
-  response.set_pierces(admission.pierce_count);
+  ToWire(AdmitPartProgram(request.program(), **machine, *options), **machine, response);
   return absl::OkStatus();
 }
 
@@ -140,6 +138,9 @@ grpc::ServerUnaryReactor* TrajectoryRpc::GetPlan(grpc::CallbackServerContext* co
     } else if (state == PlanState::kFailed) {
       for (const ProgramFault& fault : record->planned->faults) {
         ToWire(fault, *response->add_faults());
+      }
+      if (!record->tolerance.blame.empty()) {
+        ToWire(record->tolerance.blame.front(), *response->mutable_blame());
       }
     }
     return absl::OkStatus();
@@ -239,6 +240,61 @@ grpc::ServerUnaryReactor* TrajectoryRpc::ListOperations(grpc::CallbackServerCont
     }
     return absl::OkStatus();
   });
+}
+
+grpc::ServerWriteReactor<v1::AdmissionStep>* TrajectoryRpc::AdmitProgramInSteps(
+    grpc::CallbackServerContext* context, const v1::AdmitProgramRequest* request) {
+  if (const absl::Status wanted = CheckStillWanted(*context); !wanted.ok()) {
+    return RefuseStream<v1::AdmissionStep>(wanted);
+  }
+  absl::Status status = CheckProgram(request->program());
+  const auto options = FromWire(request->options());
+  const auto machine = MachineFor(request->options());
+  status = !status.ok() ? status : !options.ok() ? options.status() : machine.status();
+  if (!status.ok()) {
+    return RefuseStream<v1::AdmissionStep>(status);
+  }
+  auto stream = PushStream<v1::AdmissionStep>::New(kMostStepsWaiting);
+  auto admission =
+      std::make_shared<AdmissionInSteps>(request->program(), *options, *machine, desk_, closing_);
+  const absl::Status queued = admissions_.Submit([stream, admission] {
+    stream->Finish(Guarded([&] {
+      return admission->Run([&stream](v1::AdmissionStep step) { return stream->Push(std::move(step)); });
+    }));
+  });
+  return queued.ok() ? stream->Begin() : RefuseStream<v1::AdmissionStep>(queued);
+}
+
+grpc::ServerWriteReactor<v1::OperationBatch>* TrajectoryRpc::StreamOperations(
+    grpc::CallbackServerContext* context, const v1::ListOperationsRequest* request) {
+  absl::Status status = CheckStillWanted(*context);
+  status.Update(CheckProgram(request->program()));
+  return status.ok() ? NewPullStream<v1::OperationBatch>(OperationBatches(request->program()))
+                     : RefuseStream<v1::OperationBatch>(status);
+}
+
+grpc::ServerWriteReactor<v1::ExportPiece>* TrajectoryRpc::Export(grpc::CallbackServerContext* context,
+                                                                 const v1::ExportRequest* request) {
+  if (const absl::Status wanted = CheckStillWanted(*context); !wanted.ok()) {
+    return RefuseStream<v1::ExportPiece>(wanted);
+  }
+  ArgumentChecks checks;
+  const double step_s = request->has_step_s() ? request->step_s() : kDefaultStep_s;
+  checks.InRange("step_s", step_s, 0.0005, 1.0, "s");
+  checks.Require(v1::ExportRequest::Format_IsValid(request->format()) &&
+                     request->format() != v1::ExportRequest::FORMAT_UNSPECIFIED,
+                 "format", "UNKNOWN_FORMAT", "must be one of the formats that the request names");
+  if (!checks.ok()) {
+    return RefuseStream<v1::ExportPiece>(checks.status());
+  }
+  if (request->format() == v1::ExportRequest::FORMAT_CANONICAL) {
+    const absl::Status status = CheckProgram(request->program());
+    return status.ok() ? NewPullStream<v1::ExportPiece>(CanonicalPieces(request->program()))
+                       : RefuseStream<v1::ExportPiece>(status);
+  }
+  const auto found = DonePlan(request->plan_id());
+  return found.ok() ? NewPullStream<v1::ExportPiece>(SamplePieces((*found)->planned, step_s))
+                    : RefuseStream<v1::ExportPiece>(found.status());
 }
 
 grpc::ServerUnaryReactor* TrajectoryRpc::StartStreaming(grpc::CallbackServerContext* context,

@@ -5,6 +5,7 @@
 // A program that cannot be planned is an answer with its faults.
 #pragma once
 
+#include <atomic>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -27,6 +28,7 @@ struct Streaming {
 
 class TrajectoryRpc final : public v1::TrajectoryService::CallbackService {
  public:
+  ~TrajectoryRpc() override;
   TrajectoryRpc(FindMachine find_machine, Streaming streaming, PlanDesk& desk);
 
   grpc::ServerUnaryReactor* AdmitProgram(grpc::CallbackServerContext* context,
@@ -45,6 +47,12 @@ class TrajectoryRpc final : public v1::TrajectoryService::CallbackService {
                                       v1::ListPlansResponse* response) override;
   grpc::ServerWriteReactor<v1::SampleBatch>* StreamSamples(grpc::CallbackServerContext* context,
                                                            const v1::StreamSamplesRequest* request) override;
+  grpc::ServerWriteReactor<v1::AdmissionStep>* AdmitProgramInSteps(
+      grpc::CallbackServerContext* context, const v1::AdmitProgramRequest* request) override;
+  grpc::ServerWriteReactor<v1::OperationBatch>* StreamOperations(
+      grpc::CallbackServerContext* context, const v1::ListOperationsRequest* request) override;
+  grpc::ServerWriteReactor<v1::ExportPiece>* Export(grpc::CallbackServerContext* context,
+                                                    const v1::ExportRequest* request) override;
   grpc::ServerUnaryReactor* ListOperations(grpc::CallbackServerContext* context,
                                            const v1::ListOperationsRequest* request,
                                            v1::ListOperationsResponse* response) override;
@@ -65,6 +73,8 @@ class TrajectoryRpc final : public v1::TrajectoryService::CallbackService {
   Streaming streaming_;
   PlanDesk& desk_;
   WorkPool pool_;
+  std::atomic<bool> closing_ = false;
+  WorkPool admissions_;  // last: its threads wait for plans
 };
 
 }  // namespace lambdajet::trajectory

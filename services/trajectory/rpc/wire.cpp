@@ -6,6 +6,11 @@
 namespace lambdajet::trajectory {
 namespace {
 
+constexpr double kLeastTolerance_mm = 1e-3;
+constexpr double kMostTolerance_mm = 10.0;
+constexpr std::size_t kMostTolerances = 1000;
+constexpr std::size_t kMostSlowStretches = 200;
+
 std::string Word(std::string_view text) { return std::string(text); }
 
 type::v1::OperationState StateToWire(PlanState state) {
@@ -36,18 +41,47 @@ std::string Printable(std::string_view text) {
 absl::Status CheckProgram(const std::string& program) {
   ArgumentChecks checks;
   checks.NonEmpty("program", program);
-  checks.Text("program", program, kMostProgramBytes);
+  checks.Require(program.size() <= kMostProgramBytes, "program", "PROGRAM_TOO_LARGE",
+                 "the program has " + std::to_string(program.size()) + " bytes; at most " +
+                     std::to_string(kMostProgramBytes) + " are taken");
+  if (checks.ok()) {
+    checks.Text("program", program, kMostProgramBytes);
+  }
   return checks.status();
 }
+
+namespace {
+
+void CheckTolerances(const v1::PlanOptions& wire, ArgumentChecks& checks) {
+  if (wire.has_tolerance_mm()) {
+    checks.InRange("options.tolerance_mm", wire.tolerance_mm(), kLeastTolerance_mm, kMostTolerance_mm, "mm");
+  }
+  checks.CountInRange("options.tolerances", static_cast<std::size_t>(wire.tolerances_size()), 0,
+                      kMostTolerances);
+  for (int i = 0; i < wire.tolerances_size() && !checks.full(); ++i) {
+    const v1::ToleranceWish& wish = wire.tolerances(i);
+    const std::string field = "options.tolerances[" + std::to_string(i) + "]";
+    checks.InRange(field + ".tolerance_mm", wish.tolerance_mm(), kLeastTolerance_mm, kMostTolerance_mm, "mm");
+    checks.Require(wish.first_line() <= wish.last_line(), field + ".last_line", "LINES_REVERSED",
+                   "the first line is beyond the last");
+  }
+}
+
+}  // namespace
 
 absl::StatusOr<PlanOptions> FromWire(const v1::PlanOptions& wire) {
   PlanOptions options;
   options.compensate = wire.compensate();
-  options.tolerance_mm = wire.has_tolerance_mm() ? wire.tolerance_mm() : options.tolerance_mm;
+  if (wire.has_tolerance_mm()) {
+    options.hold.push_back({wire.tolerance_mm()});
+  }
+  for (const v1::ToleranceWish& wish : wire.tolerances()) {
+    options.hold.push_back({wish.tolerance_mm(), wish.first_line(), wish.last_line(), wish.contour()});
+  }
   options.feed_scale = wire.has_feed_scale() ? wire.feed_scale() : options.feed_scale;
   options.overlap_mm = wire.has_overlap_mm() ? wire.overlap_mm() : options.overlap_mm;
   ArgumentChecks checks;
-  checks.InRange("options.tolerance_mm", options.tolerance_mm, 1e-3, 10.0, "mm");
+  CheckTolerances(wire, checks);
   checks.InRange("options.feed_scale", options.feed_scale, 0.01, 1.2);
   checks.InRange("options.overlap_mm", options.overlap_mm, 0.0, 100.0, "mm");
   if (wire.has_start_from_s_mm()) {
@@ -74,6 +108,17 @@ void ToWire(const ProgramFault& fault, v1::ProgramFault& wire) {
   wire.set_message(Printable(fault.message));
 }
 
+void ToWire(const Admission& admission, const MachineDescription& machine, v1::AdmitProgramResponse& wire) {
+  wire.set_admitted(admission.faults.empty());
+  for (const ProgramFault& fault : admission.faults) {
+    ToWire(fault, *wire.add_faults());
+  }
+  ToWire(machine, *wire.mutable_model_version());
+  wire.set_cutting_length_mm(admission.cutting_length_mm);
+  wire.set_idle_length_mm(admission.idle_length_mm);
+  wire.set_pierces(admission.pierce_count);
+}
+
 void ToWire(const PlanRecord& record, type::v1::Operation& wire) {
   const PlanState state = record.state;
   wire.set_id(std::to_string(record.id));
@@ -89,6 +134,31 @@ void ToWire(const PlanRecord& record, type::v1::Operation& wire) {
     wire.set_message("line " + std::to_string(fault.line) + ": " + Printable(fault.message));
   }
 }
+
+namespace {
+
+void ToWire(const SlowStretch& slow, v1::SlowStretch& wire) {
+  wire.set_from_s_mm(slow.from_s_mm);
+  wire.set_to_s_mm(slow.to_s_mm);
+  wire.set_line(slow.line);
+  wire.set_limit(Word(FeedLimitName(slow.limit)));
+  wire.set_programmed_mm_per_s(slow.programmed_mm_per_s);
+  wire.set_lowest_mm_per_s(slow.lowest_mm_per_s);
+}
+
+void ToWire(const HeldTolerance& held, v1::HeldTolerance& wire) {
+  wire.set_contour(held.contour);
+  wire.set_first_line(held.first_line);
+  wire.set_last_line(held.last_line);
+  wire.set_tolerance_mm(held.tolerance_mm);
+  wire.set_predicted_95_mm(held.predicted_95_mm);
+  wire.set_worst_mm(held.worst_mm);
+  wire.set_worst_line(held.worst_line);
+  wire.set_margin_mm(held.margin_mm);
+  wire.set_worst_source(Word(accuracy::SourceName(held.worst_source)));
+}
+
+}  // namespace
 
 void ToWire(const PlanRecord& record, v1::PlanSummary& wire) {
   const PlannedProgram& p = *record.planned;
@@ -116,6 +186,24 @@ void ToWire(const PlanRecord& record, v1::PlanSummary& wire) {
     to.set_share(total_mm > 0.0 ? binding.length_mm / total_mm : 0.0);
   }
   wire.set_predicted_95_mm(record.predicted_95_mm);
+  for (std::size_t i = 0; i < p.slow.size() && i < kMostSlowStretches; ++i) {
+    ToWire(p.slow[i], *wire.add_slow_stretches());
+  }
+  wire.set_fastest_s(record.tolerance.fastest_s);
+  for (const HeldTolerance& held : record.tolerance.held) {
+    ToWire(held, *wire.add_held_tolerances());
+  }
+}
+
+void ToWire(const ToleranceBlame& blame, v1::ToleranceBlame& wire) {
+  wire.set_line(blame.line);
+  wire.set_x_w_mm(blame.p_W_mm.x());
+  wire.set_y_w_mm(blame.p_W_mm.y());
+  wire.set_tolerance_mm(blame.tolerance_mm);
+  wire.set_predicted_mm(blame.predicted_mm);
+  wire.set_source(Word(accuracy::SourceName(blame.source)));
+  wire.set_remedy(Word(blame.remedy));
+  wire.set_with_remedy_mm(blame.with_remedy_mm);
 }
 
 void AddPoint(const PlannedProgram& planned, double tau_s, v1::SampleBatch& wire) {

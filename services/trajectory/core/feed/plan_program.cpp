@@ -334,6 +334,12 @@ std::uint64_t PlanIdOf(std::string_view program, const PlanOptions& o, const Mac
         static_cast<double>(machine.version)}) {
     hash.Number(number);
   }
+  for (const ToleranceWish& wish : o.hold) {
+    for (const double number : {wish.tolerance_mm, static_cast<double>(wish.first_line),
+                                static_cast<double>(wish.last_line), static_cast<double>(wish.contour)}) {
+      hash.Number(number);
+    }
+  }
   hash.Bytes(machine.machine_id);
   hash.Bytes(machine.hash);
   for (Eigen::Index i = 0; i < machine.parameters.size(); ++i) {
@@ -342,26 +348,27 @@ std::uint64_t PlanIdOf(std::string_view program, const PlanOptions& o, const Mac
   return hash.value();
 }
 
-PlannedProgram PlanPartProgram(std::string_view program, const MachineDescription& machine,
-                               const PlanOptions& options, const PlanProgress& progress) {
-  PlannedProgram result;
-  result.faults = OptionFaults(options);
-  if (!result.faults.empty()) {
-    return result;
+ProgramPath LayOutProgram(std::string_view program, const MachineDescription& machine,
+                          const PlanOptions& options, std::vector<ProgramFault>& faults) {
+  faults = OptionFaults(options);
+  if (!faults.empty()) {
+    return {};
   }
   PartProgram read = ReadPartProgram(program, ReaderOptionsOf(machine));
-  result.faults = std::move(read.faults);
-  if (!result.faults.empty()) {
-    return result;
+  faults = std::move(read.faults);
+  if (!faults.empty()) {
+    return {};
   }
-  const ProgramPath path = MakeProgramPath(read.operations, DefaultsOf(machine, options));
+  ProgramPath path = MakeProgramPath(read.operations, DefaultsOf(machine, options));
   std::vector<Operation>().swap(read.operations);  // a long program's list is not held while it is planned
-  PlaceCheck(machine, result.faults).Check(path);
-  if (!result.faults.empty()) {
-    return result;
-  }
+  PlaceCheck(machine, faults).Check(path);
+  return path;
+}
+
+PlannedProgram PlanLaidOutProgram(const ProgramPath& path, const MachineDescription& machine,
+                                  const PlanOptions& options, const PlanProgress& progress) {
   const PlanningModel model(machine, options);
-  result = PlanPath(path, model, progress);
+  PlannedProgram result = PlanPath(path, model, progress);
   if (result.faults.empty() && options.start_from_s_mm) {
     const std::optional<ProgramPath> rest =
         PathFrom(path, result.element_begin_s_mm, result.plan.length_mm, options, machine);
@@ -373,7 +380,17 @@ PlannedProgram PlanPartProgram(std::string_view program, const MachineDescriptio
     }
     result = PlanPath(*rest, model, progress);
   }
-  result.plan.id = PlanIdOf(program, options, machine);
+  return result;
+}
+
+PlannedProgram PlanPartProgram(std::string_view program, const MachineDescription& machine,
+                               const PlanOptions& options, const PlanProgress& progress) {
+  PlannedProgram result;
+  const ProgramPath path = LayOutProgram(program, machine, options, result.faults);
+  if (result.faults.empty()) {
+    result = PlanLaidOutProgram(path, machine, options, progress);
+    result.plan.id = PlanIdOf(program, options, machine);
+  }
   return result;
 }
 

@@ -14,16 +14,28 @@
 #include <Eigen/Core>
 #include <array>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string_view>
 #include <vector>
 
 #include "foundation/machine/machine_description.hpp"
 #include "foundation/motion/plan.hpp"
+#include "trajectory/core/feed/pace.hpp"
+#include "trajectory/core/feed/program_path.hpp"
 #include "trajectory/core/feed/speed_profile.hpp"
 #include "trajectory/core/part_program/operation.hpp"
 
 namespace lambdajet::trajectory {
+
+// A tolerance that the predicted contour error is to keep, asked of a part of the program; the tightest governs.
+struct ToleranceWish {
+  double tolerance_mm = 0.0;
+  std::uint32_t first_line = 0;  // of the program; 0 and 0: any line
+  std::uint32_t last_line = 0;
+  std::uint32_t contour = 0;  // 1 is the first cut, from its pierce to jet off; 0: any
+  bool operator==(const ToleranceWish&) const = default;
+};
 
 struct PlanOptions {
   bool compensate = false;                // elastic feed-forward, and feed from predicted error
@@ -34,6 +46,8 @@ struct PlanOptions {
   double sample_s = 0.004;                // distance of PlanSamples
   double knot_s = 0.002;
   int knots_per_segment = 4;
+  std::vector<ToleranceWish> hold;   // feed from tolerance (core/tolerance); empty: not asked
+  std::shared_ptr<const Pace> pace;  // slower than the limits allow, place by place; none: as fast as they do
 };
 
 // Length over which a limit governs the feed of cutting moves.
@@ -89,6 +103,13 @@ std::uint64_t PlanIdOf(std::string_view program, const PlanOptions& options,
 
 PlannedProgram PlanPartProgram(std::string_view program, const MachineDescription& machine,
                                const PlanOptions& options, const PlanProgress& progress = {});
+
+// The first half of that: reads the program, lays its path out, and checks its place. Faults are added; no path then.
+ProgramPath LayOutProgram(std::string_view program, const MachineDescription& machine,
+                          const PlanOptions& options, std::vector<ProgramFault>& faults);
+// The second half, without the plan's id; resumes if the options say so.
+PlannedProgram PlanLaidOutProgram(const ProgramPath& path, const MachineDescription& machine,
+                                  const PlanOptions& options, const PlanProgress& progress = {});
 
 // Reads and checks only: syntax, place on the sheet, reach, singular margin, travel.
 struct Admission {

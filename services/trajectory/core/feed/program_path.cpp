@@ -226,7 +226,14 @@ double DistanceTo(const PathPiece& piece, const Vector2d& p_mm) {
 }
 
 ProgramPath MakeProgramPath(const std::vector<Operation>& operations, const PathDefaults& defaults) {
-  return PathBuilder(defaults).Build(operations);
+  ProgramPath path = PathBuilder(defaults).Build(operations);
+  double run_mm = 0.0;
+  for (PathElement& element : path.elements) {
+    element.number = static_cast<std::size_t>(&element - path.elements.data());
+    element.run_begin_mm = run_mm;
+    run_mm += element.length_mm();
+  }
+  return path;
 }
 
 }  // namespace lambdajet::trajectory

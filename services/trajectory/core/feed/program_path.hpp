@@ -58,6 +58,8 @@ struct PathElement {
   std::vector<PathEvent> events;
   GateKind gate = GateKind::kNone;
   double gate_argument = 0.0;
+  std::size_t number = 0;     // in the whole program's path
+  double run_begin_mm = 0.0;  // run: length of all runs before it, from the program's start
 
   double length_mm() const { return pieces.empty() ? 0.0 : pieces.back().begin_mm + pieces.back().length_mm; }
 };

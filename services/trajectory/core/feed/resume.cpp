@@ -34,6 +34,7 @@ PathElement RunFrom(const PathElement& run, double offset_mm) {
   PathElement rest = run;
   rest.pieces.clear();
   rest.events.clear();
+  rest.run_begin_mm += offset_mm;
   for (const PathPiece& piece : run.pieces) {
     const double end = piece.begin_mm + piece.length_mm;
     if (end <= offset_mm + 1e-9) {

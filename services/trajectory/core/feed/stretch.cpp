@@ -178,7 +178,20 @@ class StretchPlanner {
         run.slow.assign(run.nodes.size(), 1.0);
         run.ease.assign(run.nodes.size(), 1.0);
         run.slow_reason.assign(run.nodes.size(), FeedLimit::kContourTolerance);
+        if (model_.options.pace) {
+          KeepPace(*model_.options.pace, elements_[i].run_begin_mm, run);
+        }
+      } else if (model_.options.pace) {
+        planned_[i].idle_slow = model_.options.pace->OfIdle(elements_[i].number);
       }
+    }
+  }
+
+  static void KeepPace(const Pace& pace, double run_begin_mm, PlannedRun& run) {
+    for (std::size_t k = 0; k < run.nodes.size(); ++k) {
+      run.slow[k] = pace.At(run_begin_mm + run.nodes[k].offset_mm);
+      run.ease[k] = run.slow[k] * run.slow[k];
+      run.slow_reason[k] = run.slow[k] < 1.0 ? FeedLimit::kPredictedError : FeedLimit::kContourTolerance;
     }
   }
 

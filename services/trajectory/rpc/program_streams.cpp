@@ -1,0 +1,105 @@
+#include "trajectory/rpc/program_streams.hpp"
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+
+#include "foundation/contract/trouble.hpp"
+#include "trajectory/core/feed/plan_samples.hpp"
+#include "trajectory/core/part_program/read_program.hpp"
+
+namespace lambdajet::trajectory {
+namespace {
+
+constexpr std::size_t kOperationsPerBatch = 5000;
+constexpr std::size_t kBytesPerPiece = 256u << 10;
+constexpr const char* kSampleHeader =
+    "tau_s,s_mm,x_W_mm,y_W_mm,vx_W_mm_per_s,vy_W_mm_per_s,ax_W_mm_per_s2,ay_W_mm_per_s2,"
+    "actuator_1_mm,actuator_2_mm,actuator_1_mm_per_s,actuator_2_mm_per_s,cutting,source_line\n";
+
+// A program on its way out, read when it is first asked for.
+struct Listing {
+  std::string text;
+  bool read = false;
+  PartProgram program;
+  std::size_t next = 0;
+
+  explicit Listing(std::string of) : text(std::move(of)) {}
+  void Read() {
+    if (!read) {
+      program = ReadPartProgram(text);
+      std::string().swap(text);
+      read = true;
+    }
+  }
+};
+
+void AppendSample(const FullSample& s, std::string& csv) {
+  const std::array<double, 12> numbers = {
+      s.jet.tau_s,         s.jet.s_mm,          s.jet.x_W_mm,           s.jet.y_W_mm,
+      s.jet.vx_W_mm_per_s, s.jet.vy_W_mm_per_s, s.jet.ax_W_mm_per_s2,   s.jet.ay_W_mm_per_s2,
+      s.actuator_mm[0],    s.actuator_mm[1],    s.actuator_mm_per_s[0], s.actuator_mm_per_s[1]};
+  char text[32];
+  for (const double number : numbers) {
+    std::snprintf(text, sizeof text, "%.9g,", number);
+    csv += text;
+  }
+  std::snprintf(text, sizeof text, "%d,%u\n", s.jet.cutting ? 1 : 0, s.jet.source_line);
+  csv += text;
+}
+
+}  // namespace
+
+Source<v1::OperationBatch> OperationBatches(std::string program) {
+  return [listing = std::make_shared<Listing>(std::move(program))](
+             v1::OperationBatch& batch) -> absl::StatusOr<bool> {
+    const bool first = !listing->read;
+    listing->Read();
+    const PartProgram& read = listing->program;
+    if (!read.faults.empty()) {
+      for (const ProgramFault& fault : read.faults) {
+        ToWire(fault, *batch.add_faults());
+      }
+      return first;
+    }
+    for (std::size_t i = 0; i < kOperationsPerBatch && listing->next < read.operations.size(); ++i) {
+      batch.add_operations(FormatOperation(read.operations[listing->next++]));
+    }
+    return first || batch.operations_size() > 0;
+  };
+}
+
+Source<v1::ExportPiece> CanonicalPieces(std::string program) {
+  return [listing =
+              std::make_shared<Listing>(std::move(program))](v1::ExportPiece& piece) -> absl::StatusOr<bool> {
+    listing->Read();
+    const PartProgram& read = listing->program;
+    if (!read.faults.empty()) {
+      const ProgramFault& fault = read.faults.front();
+      return Trouble(absl::StatusCode::kFailedPrecondition, std::string(fault.reason),
+                     "line " + std::to_string(fault.line) + ": " + fault.message);
+    }
+    std::string& text = *piece.mutable_content();
+    while (text.size() < kBytesPerPiece && listing->next < read.operations.size()) {
+      text += FormatOperation(read.operations[listing->next++]) + "\n";
+    }
+    return !text.empty();
+  };
+}
+
+Source<v1::ExportPiece> SamplePieces(std::shared_ptr<const PlannedProgram> planned, double step_s) {
+  const auto count = static_cast<std::int64_t>(std::floor(planned->plan.duration_s / step_s + 1e-9)) + 1;
+  return [planned = std::move(planned), step_s, count,
+          next = std::int64_t{0}](v1::ExportPiece& piece) mutable -> absl::StatusOr<bool> {
+    std::string& text = *piece.mutable_content();
+    if (next == 0) {
+      text = kSampleHeader;
+    }
+    while (text.size() < kBytesPerPiece && next < count) {
+      AppendSample(SampleAt(*planned, static_cast<double>(next++) * step_s), text);
+    }
+    return !text.empty();
+  };
+}
+
+}  // namespace lambdajet::trajectory
