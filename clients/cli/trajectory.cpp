@@ -5,6 +5,7 @@
 #include "clients/cli/csv.hpp"
 #include "clients/cli/program_faults.hpp"
 #include "clients/cli/text_file.hpp"
+#include "clients/cli/tolerance_option.hpp"
 #include "clients/cli/trajectory_pictures.hpp"
 #include "clients/cli/trajectory_spatial.hpp"
 #include "clients/cli/verbs.hpp"
@@ -13,6 +14,7 @@
 #include "trajectory/core/feed/plan_program.hpp"
 #include "trajectory/core/feed/plan_samples.hpp"
 #include "trajectory/core/part_program/read_program.hpp"
+#include "trajectory/core/tolerance/plan_to_tolerance.hpp"
 
 namespace lambdajet::cli {
 namespace {
@@ -31,6 +33,9 @@ struct ProgramVerb {
   std::string colour = "speed";
   double step_s = kDefaultStep_s;
   double start_from_s_mm = -1.0;
+  double tolerance_mm = 0.0;  // 0: none
+  std::vector<std::string> tolerance_lines;
+  std::vector<std::string> tolerance_contours;
   PlanOptions options;
   std::string axes = "xy";
   trajectory::GcodeOptions reading;
@@ -95,9 +100,23 @@ absl::Status Check(const ProgramVerb& verb, Output& output) {
   return absl::OkStatus();
 }
 
+void AddWishes(const ProgramVerb& verb, PlanOptions& options) {
+  if (verb.tolerance_mm > 0.0) {
+    options.hold.push_back({verb.tolerance_mm});
+  }
+  for (const std::string& text : verb.tolerance_lines) {
+    const ToleranceWord word = ParseTolerance(text).value_or(ToleranceWord{});
+    options.hold.push_back({word.tolerance_mm, word.first, word.last, 0});
+  }
+  for (const std::string& text : verb.tolerance_contours) {
+    const ToleranceWord word = ParseTolerance(text).value_or(ToleranceWord{});
+    options.hold.push_back({word.tolerance_mm, 0, 0, word.first});
+  }
+}
+
 // The plan, or nothing after its faults were told.
-absl::StatusOr<PlannedProgram> PlanFile(const ProgramVerb& verb, Output& output,
-                                        MachineDescription& machine) {
+absl::StatusOr<trajectory::TolerancePlan> PlanFile(const ProgramVerb& verb, Output& output,
+                                                   MachineDescription& machine) {
   const auto text = ReadTextFile(verb.program);
   const auto read = ReadMachineFile(verb.machine);
   if (!text.ok() || !read.ok()) {
@@ -108,7 +127,8 @@ absl::StatusOr<PlannedProgram> PlanFile(const ProgramVerb& verb, Output& output,
   if (verb.start_from_s_mm >= 0.0) {
     options.start_from_s_mm = verb.start_from_s_mm;
   }
-  PlannedProgram planned = trajectory::PlanPartProgram(*text, machine, options, [&output](double ratio) {
+  AddWishes(verb, options);
+  trajectory::TolerancePlan planned = PlanToTolerance(*text, machine, options, [&output](double ratio) {
     output.Progress(ratio, "planning");
     return true;
   });
@@ -200,27 +220,59 @@ SpatialVerb SpatialOf(const ProgramVerb& verb) {
   return {verb.program, verb.hexapod, verb.out, verb.colour, verb.step_s, verb.options.feed_scale};
 }
 
+void TellTolerance(const trajectory::ToleranceReport& report, Output& output) {
+  if (!report.asked) {
+    return;
+  }
+  TextTable held{{"contour", "lines", "tolerance mm", "predicted 95 % mm", "worst mm", "at line", "left mm",
+                  "most from"},
+                 {}};
+  nlohmann::json list = nlohmann::json::array();
+  for (const trajectory::HeldTolerance& h : report.held) {
+    const std::string source(accuracy::SourceName(h.worst_source));
+    held.rows.push_back({std::to_string(h.contour),
+                         std::to_string(h.first_line) + "-" + std::to_string(h.last_line),
+                         Fixed(h.tolerance_mm, 3), Fixed(h.predicted_95_mm, 4), Fixed(h.worst_mm, 4),
+                         std::to_string(h.worst_line), Fixed(h.margin_mm, 4), source});
+    list.push_back({{"contour", h.contour},
+                    {"first_line", h.first_line},
+                    {"last_line", h.last_line},
+                    {"tolerance_mm", h.tolerance_mm},
+                    {"predicted_95_mm", h.predicted_95_mm},
+                    {"worst_mm", h.worst_mm},
+                    {"worst_line", h.worst_line},
+                    {"margin_mm", h.margin_mm},
+                    {"worst_source", source}});
+  }
+  output.Text("feed from tolerance, " + std::to_string(report.plans) +
+              " plans tried; the limits alone would allow " + Fixed(report.fastest_s, 2) + " s");
+  output.Table(held);
+  output.Json({{"held_tolerances", list}, {"fastest_s", report.fastest_s}, {"plans_tried", report.plans}});
+}
+
 absl::Status PlanVerb(const ProgramVerb& verb, Output& output) {
   if (!verb.hexapod.empty()) {
     return PlanSpatial(SpatialOf(verb), output);
   }
   MachineDescription machine;
-  const auto planned = PlanFile(verb, output, machine);
-  if (!planned.ok()) {
-    return planned.status();
+  const auto answer = PlanFile(verb, output, machine);
+  if (!answer.ok()) {
+    return answer.status();
   }
-  if (!planned->faults.empty()) {
-    TellFaults(verb.program, planned->faults, output);
+  const PlannedProgram& planned = answer->planned;
+  if (!planned.faults.empty()) {
+    TellFaults(verb.program, planned.faults, output);
     return absl::OkStatus();
   }
   if (!verb.out.empty()) {
-    if (const absl::Status status = WriteCsv(verb.out, SampleTable(*planned, verb.step_s)); !status.ok()) {
+    if (const absl::Status status = WriteCsv(verb.out, SampleTable(planned, verb.step_s)); !status.ok()) {
       return status;
     }
   }
   if (verb.out != "-") {
-    TellSummary(*planned, output);
-    output.Json(SummaryJson(*planned));
+    TellSummary(planned, output);
+    output.Json(SummaryJson(planned));
+    TellTolerance(answer->report, output);
   }
   return absl::OkStatus();
 }
@@ -230,15 +282,15 @@ absl::Status DrawVerb(const ProgramVerb& verb, Output& output) {
     return DrawSpatial(SpatialOf(verb), output);
   }
   MachineDescription machine;
-  const auto planned = PlanFile(verb, output, machine);
-  if (!planned.ok()) {
-    return planned.status();
+  const auto answer = PlanFile(verb, output, machine);
+  if (!answer.ok()) {
+    return answer.status();
   }
-  if (!planned->faults.empty()) {
-    TellFaults(verb.program, planned->faults, output);
+  if (!answer->planned.faults.empty()) {
+    TellFaults(verb.program, answer->planned.faults, output);
     return absl::OkStatus();
   }
-  return DrawPlan(*planned, machine, verb.colour, verb.out);
+  return DrawPlan(answer->planned, machine, verb.colour, verb.out);
 }
 
 CLI::App* AddProgramVerb(CLI::App& noun, Output& output, const char* name, const char* what,
@@ -259,9 +311,14 @@ void AddPlanOptions(CLI::App& app, const std::shared_ptr<ProgramVerb>& verb) {
   app.add_option("--machine", verb->machine, "YAML file of the machine")->capture_default_str();
   app.add_option("--hexapod", verb->hexapod, "YAML file of a hexapod, for programs in X Y Z A B C")
       ->excludes("--machine");
-  app.add_flag("--compensate", verb->options.compensate,
-               "elastic feed-forward, corner feed from predicted error");
-  app.add_option("--tolerance-mm", verb->options.tolerance_mm, "predicted error allowed with --compensate");
+  app.add_flag("--compensate", verb->options.compensate, "elastic feed-forward");
+  app.add_option("--tolerance-mm", verb->tolerance_mm,
+                 "feed from tolerance: as fast as the predicted contour error allows")
+      ->check(CLI::Range(0.001, 10.0));
+  app.add_option("--tolerance-lines", verb->tolerance_lines, "the same for lines, as 20-40=0.05")
+      ->check(ToleranceWordFault);
+  app.add_option("--tolerance-contour", verb->tolerance_contours, "the same for the n-th cut, as 2=0.05")
+      ->check(ToleranceWordFault);
   app.add_option("--feed-scale", verb->options.feed_scale, "factor on programmed feeds, above 0 to 1.2");
   app.add_option("--start-from-s-mm", verb->start_from_s_mm, "resume: path length already cut");
   app.add_option("--overlap-mm", verb->options.overlap_mm, "resume: backed up by this");
@@ -296,7 +353,7 @@ void AddTrajectoryVerbs(CLI::App& noun, Output& output) {
   AddPlanOptions(*draw_app, draw);
   draw_app->add_option("--out", draw->out, "picture, .svg or .png")->required();
   draw_app->add_option("--colour", draw->colour, "what the path's colour says")
-      ->check(CLI::IsMember({"speed", "limit"}))
+      ->check(CLI::IsMember({"speed", "limit", "error"}))
       ->capture_default_str();
   AddCldataVerbs(noun, output);
 }

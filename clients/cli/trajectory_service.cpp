@@ -9,6 +9,7 @@
 #include "clients/cli/csv.hpp"
 #include "clients/cli/service_verbs.hpp"
 #include "clients/cli/text_file.hpp"
+#include "clients/cli/tolerance_option.hpp"
 #include "foundation/contract/trouble.hpp"
 #include "lambdajet/trajectory/v1/trajectory.grpc.pb.h"
 
@@ -19,11 +20,14 @@ namespace v1 = trajectory::v1;
 using v1::TrajectoryService;
 
 constexpr auto kPoll = std::chrono::milliseconds(50);
+constexpr double kPlanning_s = 600.0;
 
 struct ProgramOptions {
   std::string file;
   bool compensate = false;
   std::optional<double> tolerance_mm;
+  std::vector<std::string> tolerance_lines;
+  std::vector<std::string> tolerance_contours;
   std::optional<double> feed_scale;
   std::optional<double> start_from_s_mm;
   std::optional<double> overlap_mm;
@@ -32,9 +36,13 @@ struct ProgramOptions {
 
 void AddProgramOptions(CLI::App& verb, ProgramOptions& options) {
   verb.add_option("FILE", options.file, "G-code; - is standard input")->required();
-  verb.add_flag("--compensate", options.compensate, "elastic feed-forward, corner feed from predicted error");
+  verb.add_flag("--compensate", options.compensate, "elastic feed-forward");
   verb.add_option("--tolerance-mm", options.tolerance_mm,
-                  "predicted contour error allowed with --compensate");
+                  "feed from tolerance: as fast as the predicted contour error allows");
+  verb.add_option("--tolerance-lines", options.tolerance_lines, "the same for lines, as 20-40=0.05")
+      ->check(ToleranceWordFault);
+  verb.add_option("--tolerance-contour", options.tolerance_contours, "the same for the n-th cut, as 2=0.05")
+      ->check(ToleranceWordFault);
   verb.add_option("--feed-scale", options.feed_scale, "factor on programmed feeds, up to 1.2");
   verb.add_option("--start-from-s-mm", options.start_from_s_mm, "path length already cut");
   verb.add_option("--overlap-mm", options.overlap_mm, "with --start-from-s-mm: back up this far");
@@ -45,6 +53,19 @@ v1::PlanOptions ToWire(const ProgramOptions& options) {
   v1::PlanOptions wire;
   wire.set_compensate(options.compensate);
   if (options.tolerance_mm) wire.set_tolerance_mm(*options.tolerance_mm);
+  for (const std::string& text : options.tolerance_lines) {
+    const ToleranceWord word = ParseTolerance(text).value_or(ToleranceWord{});
+    v1::ToleranceWish& wish = *wire.add_tolerances();
+    wish.set_tolerance_mm(word.tolerance_mm);
+    wish.set_first_line(word.first);
+    wish.set_last_line(word.last);
+  }
+  for (const std::string& text : options.tolerance_contours) {
+    const ToleranceWord word = ParseTolerance(text).value_or(ToleranceWord{});
+    v1::ToleranceWish& wish = *wire.add_tolerances();
+    wish.set_tolerance_mm(word.tolerance_mm);
+    wish.set_contour(word.first);
+  }
   if (options.feed_scale) wire.set_feed_scale(*options.feed_scale);
   if (options.start_from_s_mm) wire.set_start_from_s_mm(*options.start_from_s_mm);
   if (options.overlap_mm) wire.set_overlap_mm(*options.overlap_mm);
@@ -82,6 +103,19 @@ void PrintSummary(const v1::PlanSummary& plan, Output& output) {
     output.Text("");
     output.Table(limits);
   }
+  TextTable held{
+      {"contour", "lines", "tolerance_mm", "predicted_95_mm", "worst_mm", "at line", "left_mm", "most from"},
+      {}};
+  for (const v1::HeldTolerance& h : plan.held_tolerances()) {
+    held.rows.push_back({std::to_string(h.contour()), fmt::format("{}-{}", h.first_line(), h.last_line()),
+                         Fixed(h.tolerance_mm(), 3), Fixed(h.predicted_95_mm(), 4), Fixed(h.worst_mm(), 4),
+                         std::to_string(h.worst_line()), Fixed(h.margin_mm(), 4), h.worst_source()});
+  }
+  if (!held.rows.empty()) {
+    output.Text(
+        fmt::format("\nfeed from tolerance; the limits alone would allow {:.2f} s", plan.fastest_s()));
+    output.Table(held);
+  }
 }
 
 absl::Status Check(const ProgramOptions& options, const Connections& connections, Output& output) {
@@ -108,6 +142,83 @@ absl::Status Check(const ProgramOptions& options, const Connections& connections
           : "refused",
       response.admitted() ? Tone::kGood : Tone::kBad);
   output.Exit(response.admitted() ? ExitCode::kOk : ExitCode::kRefused);
+  return absl::OkStatus();
+}
+
+absl::Status CheckInSteps(const ProgramOptions& options, const Connections& connections, Output& output) {
+  const auto program = ReadTextFile(options.file);
+  const auto channel = connections.Open("trajectory");
+  if (!program.ok() || !channel.ok()) {
+    return program.ok() ? channel.status() : program.status();
+  }
+  v1::AdmitProgramRequest request;
+  request.set_program(*program);
+  *request.mutable_options() = ToWire(options);
+  TrajectoryService::Stub stub(*channel);
+  grpc::ClientContext context;
+  SetDeadline(context, kPlanning_s);
+  const auto stream = stub.AdmitProgramInSteps(&context, request);
+  v1::AdmissionStep step;
+  bool refused = false;
+  while (stream->Read(&step)) {
+    if (step.state() == v1::AdmissionStep::STATE_RUNNING) {
+      output.Progress(step.progress(), step.step());
+      continue;
+    }
+    output.EndProgress();
+    PrintJson(step, output);
+    refused = step.state() == v1::AdmissionStep::STATE_REFUSED;
+    output.Text(fmt::format("{:<9} {}", step.step(), refused ? "refused" : "passed"),
+                refused ? Tone::kBad : Tone::kGood);
+    PrintFaults(step.faults(), output);
+    if (step.step() == "ACCURACY" && step.has_plan()) {
+      PrintSummary(step.plan(), output);
+    }
+  }
+  output.Exit(refused ? ExitCode::kRefused : ExitCode::kOk);
+  return connections.Named("trajectory", FromWire(stream->Finish()));
+}
+
+// Prints what the service sends, piece by piece.
+absl::Status Export(const v1::ExportRequest& request, const std::string& out,
+                    const Connections& connections) {
+  const auto channel = connections.Open("trajectory");
+  if (!channel.ok()) {
+    return channel.status();
+  }
+  TrajectoryService::Stub stub(*channel);
+  grpc::ClientContext context;
+  SetDeadline(context, kPlanning_s);
+  const auto stream = stub.Export(&context, request);
+  v1::ExportPiece piece;
+  std::string text;
+  while (stream->Read(&piece)) {
+    text += piece.content();
+  }
+  const absl::Status status = connections.Named("trajectory", FromWire(stream->Finish()));
+  return status.ok() ? WriteTextFile(out, text) : status;
+}
+
+absl::Status List(const Connections& connections, Output& output) {
+  TextTable table{{"plan", "machine version", "duration s", "jet on mm", "compensated", "predicted 95 % mm"},
+                  {}};
+  v1::ListPlansRequest request;
+  v1::ListPlansResponse response;
+  do {
+    request.set_page_token(response.next_page_token());
+    const absl::Status status = connections.Ask<TrajectoryService>(
+        "trajectory", &TrajectoryService::Stub::ListPlans, request, response);
+    if (!status.ok()) {
+      return status;
+    }
+    PrintJson(response, output);
+    for (const v1::PlanSummary& plan : response.plans()) {
+      table.rows.push_back({std::to_string(plan.plan_id()), std::to_string(plan.model_version().version()),
+                            Fixed(plan.duration_s(), 2), Fixed(plan.cutting_length_mm(), 1),
+                            plan.compensated() ? "yes" : "no", Fixed(plan.predicted_95_mm(), 4)});
+    }
+  } while (!response.next_page_token().empty());
+  output.Table(table);
   return absl::OkStatus();
 }
 
@@ -184,6 +295,52 @@ absl::Status Samples(std::uint64_t plan_id, std::optional<double> step_s, const 
   return WriteCsv(out, table);
 }
 
+void AddAdmitVerb(CLI::App& noun, Output& output, const Connections& connections) {
+  auto stepped = std::make_shared<ProgramOptions>();
+  CLI::App* admit = AddServiceVerb(
+      noun, "admit", "check step by step, plan and predict: words, place, reach, limits, time, accuracy");
+  AddProgramOptions(*admit, *stepped);
+  admit->callback([stepped, &output, &connections] {
+    if (const absl::Status status = CheckInSteps(*stepped, connections, output); !status.ok())
+      output.Fail(status);
+  });
+}
+
+void AddExportVerb(CLI::App& noun, Output& output, const Connections& connections) {
+  auto file = std::make_shared<std::string>();
+  auto plan_id = std::make_shared<std::uint64_t>(0);
+  auto step = std::make_shared<std::optional<double>>();
+  auto to = std::make_shared<std::string>("-");
+  CLI::App* exported =
+      AddServiceVerb(noun, "export", "a program's canonical list, or a plan's points as CSV");
+  exported->add_option("--program", *file, "G-code, for its canonical list");
+  exported->add_option("--plan", *plan_id, "a plan, for its points")->excludes("--program");
+  exported->add_option("--step-s", *step, "distance of points in program time; default 0.004");
+  exported->add_option("--out", *to, "file; - is standard output");
+  exported->callback([file, plan_id, step, to, &output, &connections] {
+    v1::ExportRequest request;
+    request.set_plan_id(*plan_id);
+    if (*step) request.set_step_s(**step);
+    request.set_format(*plan_id != 0 ? v1::ExportRequest::FORMAT_SAMPLES_CSV
+                                     : v1::ExportRequest::FORMAT_CANONICAL);
+    if (*plan_id == 0) {
+      const auto program = ReadTextFile(*file);
+      if (!program.ok()) {
+        return output.Fail(program.status());
+      }
+      request.set_program(*program);
+    }
+    output.Finish(Export(request, *to, connections));
+  });
+}
+
+void AddListVerb(CLI::App& noun, Output& output, const Connections& connections) {
+  CLI::App* list = AddServiceVerb(noun, "list", "the plans that trajectory has");
+  list->callback([&output, &connections] {
+    if (const absl::Status status = List(connections, output); !status.ok()) output.Fail(status);
+  });
+}
+
 }  // namespace
 
 absl::Status ReadPlanPoints(const Connections& connections, std::uint64_t plan_id,
@@ -225,6 +382,10 @@ void AddTrajectoryServiceVerbs(CLI::App& noun, Output& output, const Connections
   check->callback([checked, &output, &connections] {
     if (const absl::Status status = Check(*checked, connections, output); !status.ok()) output.Fail(status);
   });
+
+  AddAdmitVerb(noun, output, connections);
+  AddExportVerb(noun, output, connections);
+  AddListVerb(noun, output, connections);
 
   auto planned = std::make_shared<ProgramOptions>();
   CLI::App* plan = AddServiceVerb(noun, "plan", "have trajectory plan a program; time, feed, what limits it");

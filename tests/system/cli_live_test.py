@@ -159,6 +159,32 @@ class EveryVerb(unittest.TestCase):
         self.assertAlmostEqual(budget["base_mm"], 0.5)
         self.assertIn("0.5000 mm", people)
 
+    def test_trajectory(self):
+        ask, run = self.lambdajet.ask, self.lambdajet.run
+        part = under_test.SOURCE / "tests" / "system" / "kill_plate.ngc"
+        people, checked = ask("trajectory", "ask-check", part)
+        self.assertIn("admitted", people)
+        self.assertTrue(checked["admitted"])
+        people, planned = ask("trajectory", "ask-plan", part, "--compensate")
+        plan = planned["summary"]["plan_id"]
+        self.assertIn("contour tolerance used", people)
+        self.assertEqual(ask("trajectory", "show", plan)[1]["summary"]["plan_id"], plan)
+        people, listed = ask("trajectory", "list")
+        self.assertIn(plan, people)
+        self.assertIn(plan, [one["plan_id"] for one in listed["plans"]])
+        samples = run("trajectory", "samples", plan, "--step-s", 0.05)
+        self.assertTrue(samples.startswith("tau_s,s_mm,"))
+        exported = run("trajectory", "export", "--plan", plan, "--step-s", 0.05)
+        self.assertEqual(len(exported.splitlines()), len(samples.splitlines()))
+        self.assertIn("PIERCE", run("trajectory", "export", "--program", part))
+        people = run("trajectory", "admit", part, "--tolerance-mm", 5, "--tolerance-contour", "1=4")
+        for step in ("PARSE", "PLACE", "REACH", "LIMITS", "TIME", "ACCURACY"):
+            self.assertRegex(people, f"{step} +passed")
+        steps = [json.loads(line) for line in run("--json", "trajectory", "admit", part).splitlines()]
+        self.assertEqual(steps[-1]["step"], "ACCURACY")
+        run("trajectory", "show", 7, code=REFUSED)
+        run("trajectory", "export", "--plan", 7, code=REFUSED)
+
     def test_inspection(self):
         ask, run, plan = self.lambdajet.ask, self.lambdajet.run, self.plan
         people, ended = ask("inspection", "end", plan)
