@@ -76,14 +76,16 @@ PaceSearch::PaceSearch(const ProgramPath& path, const MachineDescription& machin
 }
 
 bool PaceSearch::Try(const Pace& pace) {
-  if (progress_ && !progress_(std::min(0.95, 1.0 - std::exp(-0.05 * plans_)))) {
+  const double done = std::min(0.95, 1.0 - std::exp(-0.05 * plans_));
+  const PlanProgress wanted = [this, done](double) { return !progress_ || progress_(done); };
+  if (!wanted(0.0)) {
     cancelled_ = true;
     return false;
   }
   now_.pace = pace;
   options_.pace = std::make_shared<const Pace>(pace);
   ++plans_;
-  now_.planned = PlanLaidOutProgram(path_, machine_, options_);
+  now_.planned = PlanLaidOutProgram(path_, machine_, options_, wanted);
   if (!now_.planned.faults.empty()) {
     return false;
   }
