@@ -17,7 +17,7 @@ namespace {
 using trajectory::FeedLimit;
 using trajectory::PlannedProgram;
 
-constexpr double kWidth_px = 1240.0;
+constexpr double kWidth_px = 1300.0;
 constexpr double kLeft_px = 84.0;
 constexpr double kPathWidth_px = 1010.0;
 constexpr double kPathHeight_px = 700.0;
@@ -30,6 +30,7 @@ constexpr std::size_t kMostCurvePoints = 6000;
 constexpr int kPredictedPoints = 6000;
 constexpr double kPartMargin = 0.04;  // of the part's size, around it
 constexpr double kFullPercent = 100.0;
+constexpr double kInSight = 0.3;  // of a limit
 
 // Okabe and Ito's palette.
 constexpr Colour kSky{0.34, 0.71, 0.91};
@@ -187,7 +188,9 @@ void DrawColourBar(Picture& picture, const PathColours& colours) {
     const double y = top + kBarHeight_px * (1.0 - share);
     picture.Line({{kBarLeft_px + kBarWidth_px, y}, {kBarLeft_px + kBarWidth_px + 5.0, y}}, kInk, 1.0);
     picture.Text(kBarLeft_px + kBarWidth_px + 9.0, y + 4.0,
-                 Fixed(share * colours.to, colours.to < 1.0 ? 3 : 0));
+                 Fixed(share * colours.to, colours.to < 0.2    ? 3
+                                           : colours.to < 10.0 ? 2
+                                                               : 0));
   }
   picture.Text(kBarLeft_px, top - 14.0, colours.unit, 13.0);
 }
@@ -231,7 +234,7 @@ void DrawPath(Picture& picture, const PlannedProgram& planned, const MachineDesc
     y += 36.0;
   }
   picture.Dot(kLeft_px + kPathWidth_px + 24.0, kPathTop_px + kPathHeight_px - 16.0, 4.0, kInk);
-  picture.Text(kLeft_px + kPathWidth_px + 34.0, kPathTop_px + kPathHeight_px - 12.0, "pierce, n-th contour",
+  picture.Text(kLeft_px + kPathWidth_px + 34.0, kPathTop_px + kPathHeight_px - 12.0, "pierce, n-th cut",
                11.0);
 }
 
@@ -243,6 +246,7 @@ struct Profile {
   std::vector<Points> curves;
   double limit = 0.0;
   bool both_signs = false;
+  std::string limit_name = "limit";
 };
 
 double Highest(const Profile& profile) {
@@ -272,15 +276,22 @@ void ShadeSlow(PlotFrame& frame, const PlannedProgram& planned, double from, dou
 }
 
 void DrawProfile(Picture& picture, int number, const PlannedProgram& planned, const Profile& profile) {
-  const double top = 1.08 * std::max(profile.limit, Highest(profile));
+  // A limit that is far away is told in the title instead, so that the curve is seen.
+  const double highest = Highest(profile);
+  const bool in_sight = highest > kInSight * profile.limit;
+  const double top = 1.08 * (in_sight ? std::max(profile.limit, highest) : highest);
+  const std::string title =
+      profile.title + ": largest " + Fixed(kFullPercent * highest / profile.limit, 1) + " % of the limit";
   const double bottom = profile.both_signs ? -top : 0.0;
   const double duration_s = planned.plan.duration_s;
-  PlotFrame frame(picture,
-                  {kLeft_px, kProfileTop_px + number * kProfileStep_px, kPathWidth_px, kProfileHeight_px},
-                  {0.0, duration_s, "program time, s"}, {bottom, top, profile.label}, profile.title);
+  PlotFrame frame(
+      picture, {kLeft_px, kProfileTop_px + number * kProfileStep_px, kPathWidth_px, kProfileHeight_px},
+      {0.0, duration_s, "program time, s"}, {bottom, top, profile.label}, in_sight ? profile.title : title);
   ShadeSlow(frame, planned, bottom, top);
-  frame.Line({{0.0, profile.limit}, {duration_s, profile.limit}}, kVermilion, 1.2, true);
-  if (profile.both_signs) {
+  if (in_sight) {
+    frame.Line({{0.0, profile.limit}, {duration_s, profile.limit}}, kVermilion, 1.2, true);
+  }
+  if (in_sight && profile.both_signs) {
     frame.Line({{0.0, -profile.limit}, {duration_s, -profile.limit}}, kVermilion, 1.2, true);
   }
   double y = kProfileTop_px + number * kProfileStep_px + 12.0;
@@ -294,7 +305,9 @@ void DrawProfile(Picture& picture, int number, const PlannedProgram& planned, co
     frame.Line(profile.curves[c], profile.names[c].second, 1.2);
     key(profile.names[c].first, profile.names[c].second);
   }
-  key("limit", kVermilion);
+  if (in_sight) {
+    key(profile.limit_name, kVermilion);
+  }
   key("feed not held", kAmber.Faded(0.5));
 }
 
@@ -313,7 +326,9 @@ Profile SpeedProfile(const PlannedProgram& planned, const MachineDescription& ma
           "mm/s",
           {{"speed", kDeepBlue}},
           {Curve(planned, [&planned](std::size_t i) { return SpeedOf(planned.samples[i]); })},
-          machine.path.feed_mm_per_s};
+          machine.path.feed_mm_per_s,
+          false,
+          "fastest feed, jet on"};
 }
 
 Profile AccelerationProfile(const PlannedProgram& planned, const MachineDescription& machine) {
