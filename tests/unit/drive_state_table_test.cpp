@@ -51,7 +51,7 @@ const std::vector<Row> kExpected = {
     {kHolding, E::kBackUp, {kHolding, A::kResumeAfterwards}},
     {kHolding, E::kStop, {kStopping, A::kRampDown}},
     {kHolding, E::kFault, {kFault, A::kDisable}},
-    {kHeld, E::kHold, {kHeld, A::kNone}},
+    {kHeld, E::kHold, {kHeld, A::kRampDown}},
     {kHeld, E::kBackUp, {kHolding, A::kBackUp}},
     {kHeld, E::kRetrace, {kHolding, A::kRetrace}},
     {kHeld, E::kResume, {kResuming, A::kAwaitPeer}},
