@@ -48,7 +48,8 @@ absl::Status Canon(const ProgramVerb& verb, Output& output) {
   }
   trajectory::ReadOptions reading;
   reading.gcode = verb.reading;
-  reading.gcode.axes = reading.cldata.axes = verb.axes == "xy" ? trajectory::kPlanarAxes : trajectory::kSixAxes;
+  reading.gcode.axes = reading.cldata.axes =
+      verb.axes == "xy" ? trajectory::kPlanarAxes : trajectory::kSixAxes;
   const trajectory::PartProgram program = trajectory::ReadPartProgram(*text, reading);
   if (!program.faults.empty()) {
     TellFaults(verb.program, program.faults, output);

@@ -263,7 +263,8 @@ TEST(Verification, RaisesFewFalseAlarmsAndSeesThirtyFiveMicrometres) {
     const auto standing = VerifyBase(active, looks());
     alarms += standing.verdict != Verdict::kPass;
     if (standing.verdict != Verdict::kPass) {
-      std::printf("%s p %.4f move p %.4f\n", standing.explanation.c_str(), standing.p_value, standing.move_p_value);
+      std::printf("%s p %.4f move p %.4f\n", standing.explanation.c_str(), standing.p_value,
+                  standing.move_p_value);
     }
     ParameterVector moved = simulator.truth();
     moved[At(Parameter::kBaseXMm)] += 0.028;

@@ -242,7 +242,8 @@ TEST(PlanarSingularity, DistancesAreThoseOfAnIndependentSearch) {
           return drawn && drawn->second_mm > 0.0 ? std::optional(drawn->side_mm) : std::nullopt;
         });
         // Where rails cross at a wide angle the type 2 locus has a second branch, which can be nearer than the one below.
-        if (line.has_value() && (c.name != cases.back().name || std::abs(report.parallel_distance_mm) < 100.0)) {
+        if (line.has_value() &&
+            (c.name != cases.back().name || std::abs(report.parallel_distance_mm) < 100.0)) {
           ++parallel;
           worst_parallel = std::max(worst_parallel, std::abs(report.parallel_distance_mm - *line));
           EXPECT_NEAR(report.parallel_distance_mm, *line, 1e-6) << c.name << " at " << p.transpose();

@@ -184,7 +184,8 @@ inline double FastestMeanSpeed(const MachineDescription& m, double feed_mm_per_s
                                const std::vector<Eigen::Vector2d>& centres_mm) {
   const auto mechanism = kinematics::LambdaMechanism::FromDescription(m);
   const auto actuators = [&](const Eigen::Vector2d& p_W) {
-    return kinematics::SolveInverse(mechanism, m.X_DJ().translation_mm() - m.X_EW() * p_W).actuator_position_mm;
+    return kinematics::SolveInverse(mechanism, m.X_DJ().translation_mm() - m.X_EW() * p_W)
+        .actuator_position_mm;
   };
   double time_a_mm = 0.0;
   constexpr int kPlaces = 2000;

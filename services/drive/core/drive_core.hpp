@@ -45,7 +45,7 @@ struct DriveConfig {
   double resume_overlap_mm = 1.0;  // a cut that was held is taken up this much earlier
   double retrace_rate = 0.5;
   double command_age_limit_s = 2.0;
-  double positioning_share = 0.3;        // of the actuators' speed, for the move to a plan's start
+  double positioning_share = 0.3;  // of the actuators' speed, for the move to a plan's start
   // Of their acceleration. Gentle: nothing takes the sheet's swing out of this move, and on levers that hardly damp it
   // a hasty one still swings when the first contour is cut.
   double positioning_acceleration_share = 0.03;

@@ -32,18 +32,12 @@ bool OneStraightRail(const LambdaMechanism& m) {
 }
 
 lambda::BlockMechanism ForBlocks(const LambdaMechanism& m) {
-  return {m.geometry,
-          m.geometry.ratio * m.geometry.main_mm,
-          m.working_mode.s1,
-          m.working_mode.s2,
-          m.assembly_mode,
-          m.rails_apart,
-          OneStraightRail(m),
-          m.singular_margin_mm,
-          m.travel[0].min_mm,
-          m.travel[0].max_mm,
-          m.travel[1].min_mm,
-          m.travel[1].max_mm};
+  return {m.geometry,         m.geometry.ratio * m.geometry.main_mm,
+          m.working_mode.s1,  m.working_mode.s2,
+          m.assembly_mode,    m.rails_apart,
+          OneStraightRail(m), m.singular_margin_mm,
+          m.travel[0].min_mm, m.travel[0].max_mm,
+          m.travel[1].min_mm, m.travel[1].max_mm};
 }
 
 Eigen::Vector2d Positions(const InverseAnswer& answer) { return answer.actuator_position_mm; }

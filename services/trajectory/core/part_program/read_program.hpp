@@ -18,7 +18,8 @@ struct ReadOptions {
   ProgramNotation notation = ProgramNotation::kByContent;
   GcodeOptions gcode;
   CldataOptions cldata;
-  bool compensate_kerf = false;  // move the path by the kerf offset that the program asks for (core/toolpath/kerf)
+  bool compensate_kerf =
+      false;  // move the path by the kerf offset that the program asks for (core/toolpath/kerf)
 };
 
 PartProgram ReadPartProgram(std::string_view text, const ReadOptions& options = {});
