@@ -3,6 +3,7 @@
 #include <string>
 
 #include "clients/cli/csv.hpp"
+#include "clients/cli/feed_report.hpp"
 #include "clients/cli/program_faults.hpp"
 #include "clients/cli/text_file.hpp"
 #include "clients/cli/tolerance_option.hpp"
@@ -138,19 +139,7 @@ absl::StatusOr<trajectory::TolerancePlan> PlanFile(const ProgramVerb& verb, Outp
 }
 
 nlohmann::json SummaryJson(const PlannedProgram& p) {
-  nlohmann::json binding = nlohmann::json::array(), slow = nlohmann::json::array(),
-                 idle = nlohmann::json::array();
-  for (const auto& b : p.binding) {
-    binding.push_back({{"limit", std::string(FeedLimitName(b.limit))}, {"length_mm", b.length_mm}});
-  }
-  for (const auto& s : p.slow) {
-    slow.push_back({{"line", s.line},
-                    {"limit", std::string(FeedLimitName(s.limit))},
-                    {"from_s_mm", s.from_s_mm},
-                    {"to_s_mm", s.to_s_mm},
-                    {"programmed_mm_per_s", s.programmed_mm_per_s},
-                    {"lowest_mm_per_s", s.lowest_mm_per_s}});
-  }
+  nlohmann::json idle = nlohmann::json::array();
   for (const auto& i : p.idle) {
     idle.push_back({{"line", i.line},
                     {"law", std::string(i.law)},
@@ -170,8 +159,8 @@ nlohmann::json SummaryJson(const PlannedProgram& p) {
           {"events", p.plan.events.size()},
           {"compensated", p.plan.compensated},
           {"contour_deviation_mm", p.contour_deviation_mm},
-          {"binding", binding},
-          {"slow", slow},
+          {"binding", BindingJson(p.binding)},
+          {"slow", SlowJson(p.slow)},
           {"idle", idle}};
 }
 
@@ -182,23 +171,7 @@ void TellSummary(const PlannedProgram& p, Output& output) {
   output.Text(std::to_string(p.plan.segments.size()) + " segments, " + std::to_string(p.plan.gates.size()) +
               " gates, " + std::to_string(p.plan.events.size()) + " events; farthest from the contour " +
               Fixed(p.contour_deviation_mm, 4) + " mm");
-  TextTable binding{{"what limits the feed", "mm"}, {}};
-  for (const auto& b : p.binding) {
-    binding.rows.push_back({std::string(FeedLimitName(b.limit)), Fixed(b.length_mm, 1)});
-  }
-  output.Table(binding);
-  TextTable slow{{"line", "from s mm", "to s mm", "programmed mm/s", "lowest mm/s", "because"}, {}};
-  for (std::size_t i = 0; i < p.slow.size() && i < 20; ++i) {
-    const auto& s = p.slow[i];
-    slow.rows.push_back({std::to_string(s.line), Fixed(s.from_s_mm, 1), Fixed(s.to_s_mm, 1),
-                         Fixed(s.programmed_mm_per_s, 1), Fixed(s.lowest_mm_per_s, 1),
-                         std::string(FeedLimitName(s.limit))});
-  }
-  if (!slow.rows.empty()) {
-    output.Text("where the programmed feed is not held (first " + std::to_string(slow.rows.size()) + " of " +
-                std::to_string(p.slow.size()) + "):");
-    output.Table(slow);
-  }
+  TellFeed(p.binding, p.slow, output);
 }
 
 CsvTable SampleTable(const PlannedProgram& p, double step_s) {

@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "clients/cli/csv.hpp"
+#include "clients/cli/feed_report.hpp"
 #include "clients/cli/picture.hpp"
 #include "clients/cli/program_faults.hpp"
 #include "clients/cli/text_file.hpp"
@@ -73,38 +74,10 @@ void TellSummary(const SpatialFiles& files, Output& output) {
                   p.turn_deviation_rad));
   output.Text(fmt::format("struts between {:.1f} and {:.1f} mm; smallest singular margin {:.3f} mm/mm",
                           p.shortest_mm.minCoeff(), p.longest_mm.maxCoeff(), p.singular_margin_ratio));
-  TextTable binding{{"what limits the feed", "mm"}, {}};
-  for (const auto& b : p.binding) {
-    binding.rows.push_back({std::string(FeedLimitName(b.limit)), Fixed(b.length_mm, 1)});
-  }
-  output.Table(binding);
-  TextTable slow{{"line", "from s mm", "to s mm", "programmed mm/s", "lowest mm/s", "because"}, {}};
-  for (std::size_t i = 0; i < p.slow.size() && i < 20; ++i) {
-    const auto& s = p.slow[i];
-    slow.rows.push_back({std::to_string(s.line), Fixed(s.from_s_mm, 1), Fixed(s.to_s_mm, 1),
-                         Fixed(s.programmed_mm_per_s, 1), Fixed(s.lowest_mm_per_s, 1),
-                         std::string(FeedLimitName(s.limit))});
-  }
-  if (!slow.rows.empty()) {
-    output.Text(fmt::format("where the programmed feed is not held (first {} of {}):", slow.rows.size(),
-                            p.slow.size()));
-    output.Table(slow);
-  }
+  TellFeed(p.binding, p.slow, output);
 }
 
 nlohmann::json SummaryJson(const PlannedSpatialProgram& p) {
-  nlohmann::json binding = nlohmann::json::array(), slow = nlohmann::json::array();
-  for (const auto& b : p.binding) {
-    binding.push_back({{"limit", std::string(FeedLimitName(b.limit))}, {"length_mm", b.length_mm}});
-  }
-  for (const auto& s : p.slow) {
-    slow.push_back({{"line", s.line},
-                    {"limit", std::string(FeedLimitName(s.limit))},
-                    {"from_s_mm", s.from_s_mm},
-                    {"to_s_mm", s.to_s_mm},
-                    {"programmed_mm_per_s", s.programmed_mm_per_s},
-                    {"lowest_mm_per_s", s.lowest_mm_per_s}});
-  }
   return {{"plan_id", std::to_string(p.plan.id)},
           {"duration_s", p.plan.duration_s},
           {"gate_time_s", p.gate_time_s},
@@ -119,8 +92,8 @@ nlohmann::json SummaryJson(const PlannedSpatialProgram& p) {
           {"shortest_strut_mm", p.shortest_mm.minCoeff()},
           {"longest_strut_mm", p.longest_mm.maxCoeff()},
           {"singular_margin", p.singular_margin_ratio},
-          {"binding", binding},
-          {"slow", slow}};
+          {"binding", BindingJson(p.binding)},
+          {"slow", SlowJson(p.slow)}};
 }
 
 // The planned pose at tau, between samples on the chord.

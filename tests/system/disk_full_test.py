@@ -6,10 +6,10 @@ import pathlib
 import subprocess
 import sys
 import tempfile
-import time
 import unittest
 
 import cell_under_test as under_test
+from eventually import eventually
 import grpc
 import stages
 from lambdajet_client import calibration_pb2, cell_pb2
@@ -45,10 +45,7 @@ class DiskFull(unittest.TestCase):
         return " ".join(self.cell.jobs.GetMachineState(cell_pb2.GetMachineStateRequest(), timeout=10).state.vetoes)
 
     def wait_until(self, holds, what):
-        deadline = time.monotonic() + PATIENCE_S
-        while not holds():
-            self.assertLess(time.monotonic(), deadline, what)
-            time.sleep(0.05)
+        eventually(holds, PATIENCE_S, lambda: what)
 
     def refused(self, call):
         """The words of a call that must be refused because the disk is full."""

@@ -5,10 +5,10 @@ import contextlib
 import json
 import pathlib
 import sys
-import time
 import unittest
 
 import cell_under_test as under_test
+from eventually import eventually
 import stages
 from lambdajet_client import cell_pb2, inspection_pb2
 
@@ -43,16 +43,16 @@ class KillEachProcess(unittest.TestCase):
         return self.cell.jobs.GetJob(cell_pb2.GetJobRequest(job_id=job_id), timeout=10).job
 
     def wait_job(self, job_id, holds, deadline_s=40):
-        deadline = time.monotonic() + deadline_s
         job = None
-        while time.monotonic() < deadline:
+
+        def reached():
+            nonlocal job
             with contextlib.suppress(Exception):  # the cell itself may be the one that was killed
                 job = self.job(job_id)
-                if holds(job):
-                    return job
-            time.sleep(0.05)
-        self.fail(f"not in {deadline_s} s; the job is {job}")
-        return None
+                return job if holds(job) else None
+            return None
+
+        return eventually(reached, deadline_s, lambda: f"the job is {job}")
 
     def kill_while_cutting(self, victim):
         """Runs the plate, kills the victim at about a third of the way; returns (job id, instant of the kill)."""

@@ -8,13 +8,13 @@ import socket
 import subprocess
 import sys
 import tempfile
-import time
 import types
 import unittest
 import urllib.parse
 import urllib.request
 
 import cell_under_test as under_test
+from eventually import eventually
 
 BUILD = pathlib.Path(sys.argv.pop(1))
 SCRAPED = ("calibration", "kinematics", "drive")
@@ -65,17 +65,20 @@ class Prometheus:
         return {entry["metric"].get("house", ""): float(entry["value"][1]) for entry in answer["data"]["result"]}
 
     def wait_for(self, expression, holds):
-        deadline = time.monotonic() + PATIENCE_S
         found = None
-        while time.monotonic() < deadline and self.child.poll() is None:
+
+        def looked():
+            nonlocal found
+            if self.child.poll() is not None:
+                raise AssertionError(f"prometheus has ended: {self.log.read_text()[-1000:]}")
             try:
                 found = self.query(expression)
-                if holds(found):
-                    return found
             except OSError as error:  # not listening yet
                 found = error
-            time.sleep(0.05)
-        raise AssertionError(f"{expression}: {found}; {self.log.read_text()[-1000:]}")
+                return None
+            return found if holds(found) else None
+
+        return eventually(looked, PATIENCE_S, lambda: f"{expression}: {found}; {self.log.read_text()[-1000:]}")
 
 
 class RealPrometheus(unittest.TestCase):

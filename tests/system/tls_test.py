@@ -10,6 +10,7 @@ import types
 import unittest
 
 import cell_under_test as under_test
+from eventually import eventually
 
 BUILD = pathlib.Path(sys.argv.pop(1))
 UNREACHABLE, DONE = 3, 0
@@ -67,11 +68,12 @@ class Tls(unittest.TestCase):
         for name in names:
             self.processes.flags += further if name == "cell" else []
             self.processes.start_one(name)
-        deadline = time.monotonic() + PATIENCE_S
-        while not all(self.processes.announced(name) for name in names):
+
+        def announced():
             self.processes.check_alive()
-            self.assertLess(time.monotonic(), deadline, [self.processes.last_words(name) for name in names])
-            time.sleep(0.02)
+            return all(self.processes.announced(name) for name in names)
+
+        eventually(announced, PATIENCE_S, lambda: [self.processes.last_words(name) for name in names])
 
     def ask(self, *words, ca=None, own=None):
         """(exit code, all that was said)"""

@@ -50,23 +50,6 @@ struct PlanOptions {
   std::shared_ptr<const Pace> pace;  // slower than the limits allow, place by place; none: as fast as they do
 };
 
-// Length over which a limit governs the feed of cutting moves.
-struct BindingLength {
-  FeedLimit limit = FeedLimit::kFeed;
-  double length_mm = 0.0;
-};
-
-// A stretch of cutting path where the programmed feed is not held, for one reason; where another limit takes over, another
-// stretch begins.
-struct SlowStretch {
-  double from_s_mm = 0.0;
-  double to_s_mm = 0.0;
-  std::uint32_t line = 0;
-  FeedLimit limit = FeedLimit::kFeed;
-  double programmed_mm_per_s = 0.0;
-  double lowest_mm_per_s = 0.0;
-};
-
 // How an idle move is made.
 struct IdleReport {
   std::uint32_t line = 0;

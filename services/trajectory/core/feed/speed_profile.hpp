@@ -46,6 +46,23 @@ std::string_view FeedLimitName(FeedLimit limit);
 FeedLimit ActuatorVelocityLimit(std::size_t j);
 FeedLimit ActuatorAccelerationLimit(std::size_t j);
 
+// Length over which a limit governs the feed of cutting moves.
+struct BindingLength {
+  FeedLimit limit = FeedLimit::kFeed;
+  double length_mm = 0.0;
+};
+
+// A stretch of cutting path where the programmed feed is not held, for one reason; where another limit takes over, another
+// stretch begins.
+struct SlowStretch {
+  double from_s_mm = 0.0;
+  double to_s_mm = 0.0;
+  std::uint32_t line = 0;
+  FeedLimit limit = FeedLimit::kFeed;
+  double programmed_mm_per_s = 0.0;
+  double lowest_mm_per_s = 0.0;
+};
+
 template <std::size_t N>
 struct ProfileNodeOf {
   double offset_mm = 0.0;

@@ -24,8 +24,8 @@ struct PlannedSpatialProgram {
   SpatialPlan plan;
   std::vector<SpatialPlanSample> samples;
   std::vector<ProgramFault> faults;
-  std::vector<SpatialBindingLength> binding;  // longest first
-  std::vector<SpatialSlowStretch> slow;
+  std::vector<BindingLength> binding;  // longest first
+  std::vector<SlowStretch> slow;
   double tip_deviation_mm = 0.0;  // largest, from the programmed path
   double turn_deviation_rad = 0.0;
   double cutting_time_s = 0.0;

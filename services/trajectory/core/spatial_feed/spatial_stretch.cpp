@@ -469,7 +469,7 @@ class StretchPlanner {
   }
 
   void Report() {
-    SpatialSlowStretch* open = nullptr;
+    SlowStretch* open = nullptr;
     for (std::size_t k = 0; k + 1 < solved_.size(); ++k) {
       const SpatialNode& node = solved_[k];
       const double cell = solved_[k + 1].offset_mm - node.offset_mm;

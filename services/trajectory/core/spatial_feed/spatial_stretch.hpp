@@ -25,26 +25,11 @@ struct SpatialPlanSample {
   std::uint32_t line = 0;
 };
 
-struct SpatialBindingLength {
-  FeedLimit limit = FeedLimit::kFeed;
-  double length_mm = 0.0;
-};
-
-// A stretch where the programmed feed is not held; speeds along the path length.
-struct SpatialSlowStretch {
-  double from_s_mm = 0.0;
-  double to_s_mm = 0.0;
-  std::uint32_t line = 0;
-  FeedLimit limit = FeedLimit::kFeed;
-  double programmed_mm_per_s = 0.0;
-  double lowest_mm_per_s = 0.0;
-};
-
 struct SpatialStretchPlan {
   std::vector<SpatialSegment> segments;  // start_s from the stretch's begin
   std::vector<SpatialPlanSample> samples;
   std::array<double, kFeedLimitCount> binding_mm{};
-  std::vector<SpatialSlowStretch> slow;
+  std::vector<SlowStretch> slow;
   std::vector<ProgramFault> faults;
   double duration_s = 0.0;
   double tip_deviation_mm = 0.0;
