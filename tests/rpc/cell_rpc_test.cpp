@@ -130,8 +130,9 @@ class RunningCell {
       {
         const std::lock_guard lock(machine_lock_);
         machine_.Advance(clock_.now_ns());
-        if (machine_.view.drive) desk_->Hear(*machine_.view.drive);
-        if (machine_.view.main_motion) desk_->Hear(*machine_.view.main_motion);
+        const bool heard = ++turns_ > machine_.turns_unheard;
+        if (heard) desk_->Hear(*machine_.view.drive);
+        if (heard) desk_->Hear(*machine_.view.main_motion);
         for (const CommandOut& command : desk_->Cycle().commands) {
           machine_.Obey(command, clock_.now_ns());
         }
@@ -151,6 +152,7 @@ class RunningCell {
   std::unique_ptr<CellDoor> door_;
   std::unique_ptr<RpcServer> server_;
   std::unique_ptr<CellService::Stub> stub_;
+  int turns_ = 0;
   std::atomic<bool> stop_ = false;
   std::thread loop_;
 };
@@ -495,6 +497,22 @@ TEST_F(CellRpc, ARestartedCellGoesOnWithARunningJob) {
   Begin();
   EXPECT_TRUE(Reaches(job_id, v1::JOB_STATE_COMPLETED));
   EXPECT_EQ(Get(job_id).plan_ids_size(), 1);
+}
+
+// Whoever serves may not have heard anyone yet: that is not the same as lost.
+TEST_F(CellRpc, AWishInACellsFirstMomentWaitsUntilItHasHeardTheModules) {
+  machine.turns_unheard = 30;
+  Begin();
+  Reset();
+  const std::string job_id = MustSubmit(Wish("early")).job_id();
+  Begin();
+  EXPECT_TRUE(Start(job_id).ok());
+  ASSERT_TRUE(Reaches(job_id, v1::JOB_STATE_COMPLETED));
+  machine.turns_unheard = std::numeric_limits<int>::max();
+  Begin();
+  v1::ResetMachineResponse response;
+  ExpectTrouble(cell->Ask(&CellService::Stub::ResetMachine, v1::ResetMachineRequest(), response),
+                absl::StatusCode::kFailedPrecondition, "DRIVE_LOST");
 }
 
 TEST_F(CellRpc, AWatcherHearsEveryChangeFromItsTokenOnAndProgressInBetween) {

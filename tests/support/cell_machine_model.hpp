@@ -52,12 +52,8 @@ class MachineModel {
         view.drive->mode = view.main_motion->mode = ModuleMode::kComplete;
       }
     }
-    if (!drive_silent) {
-      view.drive->heard_ns = now_ns;
-    }
-    if (!main_motion_silent) {
-      view.main_motion->heard_ns = now_ns;
-    }
+    Speak(*view.drive, drive_silent, now_ns);
+    Speak(*view.main_motion, main_motion_silent, now_ns);
   }
 
   // As if trajectory had filled both buffers.
@@ -75,9 +71,14 @@ class MachineModel {
   bool drive_deaf = false;
   bool drive_silent = false;
   bool main_motion_silent = false;
+  int turns_unheard = 0;  // of a new cell's loop, before it hears anything
   ModuleReason refuse_arm = ModuleReason::kNone;
 
  private:
+  static void Speak(ModuleView& module, bool silent, std::int64_t now_ns) {
+    module.heard_ns = silent ? module.heard_ns : now_ns;
+    module.quiet_turns = silent ? module.quiet_turns + 1 : 0;
+  }
   void Obey(ModuleView& module, const CommandOut& command, std::int64_t) {
     module.echo = {kModelSession, command.sequence_number, 1, ModuleReason::kNone};
     switch (command.verb) {

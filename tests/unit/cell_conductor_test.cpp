@@ -260,6 +260,23 @@ TEST_F(ConductorTest, FindsTheJobAgainWhenTheDriveWasOnlyOutOfHearing) {
   ASSERT_TRUE(Reaches(JobState::kCompleted));
 }
 
+// The host, or the disk under the journal, stands still for longer than a module may be silent, and nobody was silent.
+TEST_F(ConductorTest, ACellThatStoodStillItselfHasLostNobody) {
+  machine.length_mm = 500.0;
+  Run();
+  for (int pause = 0; pause < 5; ++pause) {
+    now_ns += 3'000'000'000;
+    conductor.Step(machine.view, now_ns);  // before anything new was heard
+    Deliver();
+    ASSERT_EQ(job.progress.state, JobState::kRunning) << job.progress.reason;
+    Cycle();
+  }
+  now_ns += 3'000'000'000;
+  machine.drive_silent = true;  // and one that falls silent meanwhile is missed soon after
+  ASSERT_TRUE(CycleUntil([&] { return job.progress.state == JobState::kInterrupted; }, kSilentTurns + 1));
+  EXPECT_EQ(job.progress.reason, "DRIVE_LOST");
+}
+
 TEST_F(ConductorTest, AStopEndsInAnInterruptionThatResumeCanTakeUp) {
   Run();
   conductor.Stop(now_ns);

@@ -49,7 +49,7 @@ void AddModule(const char* name, const char* lost, const ModuleView* module, std
 }  // namespace
 
 bool Heard(const ModuleView& module, std::int64_t now_ns) {
-  return SecondsBetween(module.heard_ns, now_ns) <= kSilence_s;
+  return SecondsBetween(module.heard_ns, now_ns) <= kSilence_s || module.quiet_turns < kSilentTurns;
 }
 
 bool DriveHeard(const MachineView& machine, std::int64_t now_ns) {

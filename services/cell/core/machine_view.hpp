@@ -1,8 +1,9 @@
 // Holds what the cell last heard from both machine modules, and says what forbids a start.
 //
 // Model: each module's state sample in plain values with the time it was heard. A module not heard for
-// kSilence_s is lost to the cell (which stops nothing: the modules watch each other themselves). Units: mm,
-// s; times are common time in ns. Threads: values.
+// kSilence_s is lost to the cell (which stops nothing: the modules watch each other themselves), if the cell's own loop
+// has turned kSilentTurns times meanwhile: a host, or a disk under the journal, that stood still is no module's silence.
+// Units: mm, s; times are common time in ns. Threads: values.
 #pragma once
 
 #include <array>
@@ -17,6 +18,7 @@
 namespace lambdajet::cell {
 
 inline constexpr double kSilence_s = 2.0;
+inline constexpr int kSilentTurns = 25;  // of the cell's loop; half a second of it
 inline constexpr double kLargestClockOffset_s = 0.2e-3;
 inline constexpr double kNanosecondsPerSecond = 1e9;
 
@@ -38,6 +40,7 @@ struct CommandEcho {
 // What both modules' states have in common.
 struct ModuleView {
   std::int64_t heard_ns = 0;
+  int quiet_turns = 0;  // of the cell's loop since then
   std::uint64_t session = 0;
   ModuleMode mode = ModuleMode::kOff;
   ModuleReason reason = ModuleReason::kNone;

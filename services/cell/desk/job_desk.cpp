@@ -15,6 +15,8 @@ constexpr double kAdmissionRetry_s = 1.0;
 constexpr double kJournalRetry_s = 0.5;
 constexpr std::size_t kMostAnnouncements = 256;
 constexpr std::size_t kMostAdmissionsWaiting = 1000;
+constexpr int kListeningTurns =
+    100;  // of a new cell's loop: two seconds of it; whoever is not heard by then is lost
 
 absl::Status Precondition(const Refusal& refusal) {
   return Trouble(absl::StatusCode::kFailedPrecondition, refusal.reason, refusal.message);
@@ -217,6 +219,13 @@ void JobDesk::WriteDownAgainIfDue(std::int64_t now_ns) {
 JobDesk::Outgoing JobDesk::Cycle() {
   const Lock lock(mutex_);
   const std::int64_t now_ns = clock_.now_ns();
+  ++turns_;
+  if (machine_.drive) {
+    ++machine_.drive->quiet_turns;
+  }
+  if (machine_.main_motion) {
+    ++machine_.main_motion->quiet_turns;
+  }
   conductor_.Step(machine_, now_ns);
   for (auto actions = conductor_.TakeActions(); !actions.empty(); actions = conductor_.TakeActions()) {
     Carry(std::move(actions));
@@ -324,8 +333,16 @@ void JobDesk::WaitUntilUnloaded(Lock& lock, double patience_s) {
   WaitFor(lock, patience_s, [&] { return conductor_.phase() != Phase::kUnloading; });
 }
 
+// Nor has a cell that has just begun heard everybody.
+void JobDesk::WaitUntilListened(Lock& lock, double patience_s) {
+  WaitFor(lock, patience_s, [&] {
+    return turns_ >= kListeningTurns || (machine_.drive && machine_.main_motion && model_version_);
+  });
+}
+
 absl::StatusOr<LiveJob> JobDesk::Start(const std::string& job_id, double patience_s) {
   Lock lock(mutex_);
+  WaitUntilListened(lock, patience_s);
   WaitUntilUnloaded(lock, patience_s);
   const auto job = Current(job_id);
   if (!job.ok()) {
@@ -350,6 +367,7 @@ absl::StatusOr<LiveJob> JobDesk::Start(const std::string& job_id, double patienc
 
 absl::StatusOr<LiveJob> JobDesk::Resume(const std::string& job_id, double overlap_mm, double patience_s) {
   Lock lock(mutex_);
+  WaitUntilListened(lock, patience_s);
   WaitUntilUnloaded(lock, patience_s);
   const auto job = Current(job_id);
   if (!job.ok()) {
@@ -473,6 +491,7 @@ absl::StatusOr<double> JobDesk::Override(double factor, double patience_s) {
 
 absl::StatusOr<MachineWord> JobDesk::Reset(double patience_s) {
   Lock lock(mutex_);
+  WaitUntilListened(lock, patience_s);
   WaitUntilUnloaded(lock, patience_s);
   if (const auto refusal = conductor_.Reset(machine_, clock_.now_ns())) {
     return Precondition(*refusal);

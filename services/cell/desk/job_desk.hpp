@@ -150,6 +150,7 @@ class JobDesk {
   template <typename Condition>
   bool WaitFor(Lock& lock, double patience_s, Condition&& condition);
   void WaitUntilUnloaded(Lock& lock, double patience_s);
+  void WaitUntilListened(Lock& lock, double patience_s);
   absl::StatusOr<LiveJob> WaitUntilStarted(Lock& lock, const std::string& job_id, double patience_s);
   void CheckpointIfDue(std::int64_t now_ns);
   void WriteDownAgainIfDue(std::int64_t now_ns);
@@ -162,6 +163,7 @@ class JobDesk {
 
   Conductor conductor_;
   MachineView machine_;
+  int turns_ = 0;  // of the loop
   Recorder recorder_;
   std::optional<Job> active_;  // the job the conductor leads or last led
   std::optional<ModelVersion> model_version_;
