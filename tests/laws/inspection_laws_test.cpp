@@ -243,6 +243,34 @@ TEST(Inspection, LeadsCrossingElsewhereDoNotMatter) {
   EXPECT_NEAR(result.max_mm, 0.2, 1e-3);
 }
 
+// At 1-2 mm/s a millisecond is a micrometre: what single samples do says nothing about where the cut goes.
+TEST(Inspection, ASlowCutThatSwingsAndIsMeasuredWithNoiseIsCutEverywhere) {
+  std::mt19937 random(7);
+  const auto between = [&](double low, double high) {
+    return std::uniform_real_distribution(low, high)(random);
+  };
+  for (int i = 0; i < 12; ++i) {
+    const double speed = between(0.8, 2.0);  // mm/s
+    const double swing = between(0.01, 0.08);
+    const double frequency = between(3.0, 9.0);
+    const double noise = between(0.0, 0.003);
+    const double phase = between(0.0, kTurn);
+    const double radius = between(3.0, 6.0);
+    std::normal_distribution<double> gauss(0.0, noise);
+    const auto path = [&](double t) {
+      const double angle = speed * t / radius;
+      const Eigen::Vector2d swung(std::cos(kTurn * frequency * t), std::sin(kTurn * frequency * t + phase));
+      return Eigen::Vector2d(Eigen::Vector2d(100, 80) +
+                             radius * Eigen::Vector2d(std::cos(angle), std::sin(angle)) + swing * swung +
+                             Eigen::Vector2d(gauss(random), gauss(random)));
+    };
+    const auto result =
+        Judge(TruthOf(path, 1.05 * kTurn * radius / speed), CircleDrawing(radius + 0.5, Side::kInside));
+    EXPECT_EQ(result.not_cut, 0u) << speed << " mm/s, swing " << swing << " mm at " << frequency << " Hz";
+    EXPECT_LE(result.max_mm, 1.5 * swing + 5.0 * noise + 1e-3);
+  }
+}
+
 TEST(JoinTruth, DoesNotDependOnBatchesOrOrder) {
   const Truth truth = CircleTruth({100, 80}, 29.7, 0.01);
   const CutPath once = JoinTruth(truth);

@@ -66,6 +66,8 @@ TEST(MainJob, CutsWithinTheToleranceAskedFor) {
         "s (%.1f s)\n",
         static_cast<int>(seed), kIdentified_mm, identified.p95_mm, identified.planned_s, identified.fastest_s,
         kCompensated_mm, compensated.p95_mm, compensated.planned_s, compensated.fastest_s);
+    EXPECT_EQ(identified.not_cut, 0u);
+    EXPECT_EQ(compensated.not_cut, 0u);
     EXPECT_LE(identified.p95_mm, kIdentified_mm);
     EXPECT_LE(compensated.p95_mm, kCompensated_mm);
     EXPECT_LE(identified.promised_95_mm, kIdentified_mm);

@@ -95,7 +95,7 @@ void ForEachCrossing(const SegmentGrid& grid, const OutlinePoint& point, double 
     const double ta = point.n.dot(s.a - point.p);
     const double tb = point.n.dot(s.b - point.p);
     const double t = ta + (tb - ta) * ua / (ua - ub);
-    const double cosine = (ub - ua) / (s.b - s.a).norm();
+    const double cosine = along.dot(s.along);
     if (std::abs(t - half_kerf_mm) <= kSearchMm && std::abs(cosine) >= kAligned) {
       visit(t, cosine > 0.0 ? 1.0 : -1.0);
     }
