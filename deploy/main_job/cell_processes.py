@@ -10,18 +10,31 @@ import time
 
 SEVEN = ("kinematics", "calibration", "trajectory", "accuracy", "cell", "drive", "main_motion")
 JUDGE = "inspection"
+PORTS_BEGIN, PORTS_PER_DOMAIN = 20000, 16  # the same in tests/support/cell_processes.hpp
 # Calibration first: everyone else waits for the machine description that it publishes.
 START_ORDER = ("calibration", "drive", "main_motion", "kinematics", "trajectory", "accuracy", "cell", JUDGE)
 STOP_ORDER = ("cell", "trajectory", "accuracy", "kinematics", "drive", "main_motion", "calibration", JUDGE)
 
 
-def free_ports():
-    """A free TCP port for each process; all are open at once so that they differ."""
-    with contextlib.ExitStack() as stack:
-        sockets = {name: stack.enter_context(socket.socket()) for name in START_ORDER}
-        for one in sockets.values():
-            one.bind(("127.0.0.1", 0))
-        return {name: one.getsockname()[1] for name, one in sockets.items()}
+def free_ports(domain):
+    """A free TCP port for each process, from a block that belongs to the DDS domain as long as somebody holds that. Below
+    the ports the kernel gives to whoever asks for any: one of those may be given away again before the process takes it."""
+    block = iter(range(PORTS_BEGIN + PORTS_PER_DOMAIN * domain, PORTS_BEGIN + PORTS_PER_DOMAIN * (domain + 1)))
+    ports = {}
+    for name in START_ORDER:
+        ports[name] = next((port for port in block if is_free(port)), None)
+        if ports[name] is None:
+            raise StartFailed(f"fewer than {len(START_ORDER)} free ports in the block of domain {domain}")
+    return ports
+
+
+def is_free(port):
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        with contextlib.suppress(OSError):
+            probe.bind(("127.0.0.1", port))
+            return True
+    return False
 
 
 class StartFailed(Exception):

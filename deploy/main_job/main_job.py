@@ -251,7 +251,7 @@ def make_processes(options):
 
         return cell_containers.Containers(SOURCE, run_folder, options)
     flags = [f"--bus.domain={options.domain}"] if options.domain else []
-    ports = cell_processes.free_ports() if options.free_ports else None
+    ports = cell_processes.free_ports(options.domain or 0) if options.free_ports else None
     if ports:
         flags.append("--metrics.address=127.0.0.1:0")
     return cell_processes.LocalProcesses(SOURCE, options.build_folder, run_folder, options, flags, ports)

@@ -6,6 +6,8 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <cstdint>
 #include <map>
 #include <memory>
 #include <stdexcept>
@@ -18,19 +20,26 @@
 
 namespace lambdajet::test {
 
-// A port that nobody has at this moment, for a process that must come back under the same one.
-inline int FreePort() {
-  const int file = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  socklen_t size = sizeof address;
-  if (bind(file, reinterpret_cast<sockaddr*>(&address), size) != 0 ||
-      getsockname(file, reinterpret_cast<sockaddr*>(&address), &size) != 0) {
-    throw std::runtime_error("no free port");
+// A free port for a process that must come back under the same one, from the block that belongs to a reserved domain. The
+// kernel's own choice could be given to somebody else before the process takes it.
+inline int FreePort(int domain, int from_port) {
+  constexpr int kBegin = 20000, kPerDomain = 16;  // the same in deploy/main_job/cell_processes.py
+  for (int port = std::max(from_port, kBegin + kPerDomain * domain);
+       port < kBegin + kPerDomain * (domain + 1); ++port) {
+    const int file = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    const int on = 1;
+    setsockopt(file, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    address.sin_port = htons(static_cast<std::uint16_t>(port));
+    const bool free = bind(file, reinterpret_cast<sockaddr*>(&address), sizeof address) == 0;
+    close(file);
+    if (free) {
+      return port;
+    }
   }
-  close(file);
-  return ntohs(address.sin_port);
+  throw std::runtime_error("no free port");
 }
 
 class CellProcesses {
@@ -72,7 +81,11 @@ class CellProcesses {
  private:
   int Port(const std::string& house) {
     const auto found = ports_.find(house);
-    return found != ports_.end() ? found->second : ports_[house] = FreePort();
+    if (found != ports_.end()) {
+      return found->second;
+    }
+    next_port_ = 1 + FreePort(domain_.number(), next_port_);
+    return ports_[house] = next_port_ - 1;
   }
 
   ChildOptions Options(const std::string& house) {
@@ -105,6 +118,7 @@ class CellProcesses {
   TemporaryFolder folder_;
   PrivateDomain domain_;
   std::map<std::string, int> ports_;
+  int next_port_ = 0;
   std::map<std::string, std::unique_ptr<ChildProcess>> houses_;
 };
 

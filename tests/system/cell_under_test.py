@@ -43,7 +43,7 @@ def cell_under_test(build, plant=SOURCE / "deploy" / "plants" / "shipped.yaml", 
             pathlib.Path(folder),
             options,
             flags=[f"--bus.domain={domain}", "--metrics.address=127.0.0.1:0", *flags],
-            ports=cell_processes.free_ports(),
+            ports=cell_processes.free_ports(domain),
         )
         with contextlib.ExitStack() as at_the_end:
             at_the_end.callback(processes.stop)

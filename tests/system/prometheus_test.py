@@ -90,7 +90,7 @@ class RealPrometheus(unittest.TestCase):
                                         plant=under_test.SOURCE / "deploy" / "plants" / "shipped.yaml", seed=1)
         processes = under_test.cell_processes.LocalProcesses(
             under_test.SOURCE, BUILD, folder, options, flags=[f"--bus.domain={domain}", "--metrics.address=127.0.0.1:0"],
-            ports=under_test.cell_processes.free_ports())
+            ports=under_test.cell_processes.free_ports(domain))
         cls.addClassCleanup(processes.stop)
         for name in SCRAPED:
             processes.start_one(name)

@@ -58,7 +58,7 @@ class Tls(unittest.TestCase):
         options = types.SimpleNamespace(machine=under_test.SOURCE / "deploy" / "config" / "machine.yaml", plant=None, seed=1)
         self.processes = under_test.cell_processes.LocalProcesses(
             under_test.SOURCE, BUILD, pathlib.Path(run), options, flags=[f"--bus.domain={domain}", "--metrics.address=127.0.0.1:0"],
-            ports=under_test.cell_processes.free_ports())
+            ports=under_test.cell_processes.free_ports(domain))
         self.addCleanup(self.processes.stop)
 
     def start(self, *names, mutual, further=()):
