@@ -33,6 +33,7 @@ struct ProgramVerb {
   std::string out;
   std::string colour = "speed";
   double step_s = kDefaultStep_s;
+  double rate_hz = 10000.0;
   double start_from_s_mm = -1.0;
   double tolerance_mm = 0.0;  // 0: none
   std::vector<std::string> tolerance_lines;
@@ -51,6 +52,7 @@ absl::Status Canon(const ProgramVerb& verb, Output& output) {
   reading.gcode = verb.reading;
   reading.gcode.axes = reading.cldata.axes =
       verb.axes == "xy" ? trajectory::kPlanarAxes : trajectory::kSixAxes;
+  reading.cldata.tool_angles = trajectory::ToolAngles::kRollPitch;
   const trajectory::PartProgram program = trajectory::ReadPartProgram(*text, reading);
   if (!program.faults.empty()) {
     TellFaults(verb.program, program.faults, output);
@@ -80,7 +82,15 @@ absl::Status Canon(const ProgramVerb& verb, Output& output) {
   return absl::OkStatus();
 }
 
+SpatialVerb SpatialOf(const ProgramVerb& verb) {
+  return {verb.program, verb.hexapod, verb.out, verb.colour, verb.step_s, verb.options.feed_scale,
+          verb.rate_hz};
+}
+
 absl::Status Check(const ProgramVerb& verb, Output& output) {
+  if (!verb.hexapod.empty()) {
+    return CheckSpatial(SpatialOf(verb), output);
+  }
   const auto text = ReadTextFile(verb.program);
   const auto machine = ReadMachineFile(verb.machine);
   if (!text.ok() || !machine.ok()) {
@@ -190,10 +200,6 @@ CsvTable SampleTable(const PlannedProgram& p, double step_s) {
   return table;
 }
 
-SpatialVerb SpatialOf(const ProgramVerb& verb) {
-  return {verb.program, verb.hexapod, verb.out, verb.colour, verb.step_s, verb.options.feed_scale};
-}
-
 void TellTolerance(const trajectory::ToleranceReport& report, Output& output) {
   if (!report.asked) {
     return;
@@ -281,10 +287,14 @@ CLI::App* AddProgramVerb(CLI::App& noun, Output& output, const char* name, const
   return app;
 }
 
-void AddPlanOptions(CLI::App& app, const std::shared_ptr<ProgramVerb>& verb) {
+void AddMachineOptions(CLI::App& app, const std::shared_ptr<ProgramVerb>& verb) {
   app.add_option("--machine", verb->machine, "YAML file of the machine")->capture_default_str();
   app.add_option("--hexapod", verb->hexapod, "YAML file of a hexapod, for programs in X Y Z A B C")
       ->excludes("--machine");
+}
+
+void AddPlanOptions(CLI::App& app, const std::shared_ptr<ProgramVerb>& verb) {
+  AddMachineOptions(app, verb);
   app.add_flag("--compensate", verb->options.compensate, "elastic feed-forward");
   app.add_option("--tolerance-mm", verb->tolerance_mm,
                  "feed from tolerance: as fast as the predicted contour error allows")
@@ -313,7 +323,19 @@ void AddTrajectoryVerbs(CLI::App& noun, Output& output) {
   const auto check = std::make_shared<ProgramVerb>();
   CLI::App* check_app =
       AddProgramVerb(noun, output, "check", "whether a program can be cut; exit code 4 if not", check, Check);
-  check_app->add_option("--machine", check->machine, "YAML file of the machine")->capture_default_str();
+  AddMachineOptions(*check_app, check);
+  const auto play = std::make_shared<ProgramVerb>();
+  play->hexapod = "deploy/config/hexapod.yaml";
+  CLI::App* play_app = AddProgramVerb(
+      noun, output, "play", "plays a hexapod's plan through its kinematics: error of the tip, limits, time",
+      play, [](const ProgramVerb& verb, Output& to) { return PlaySpatial(SpatialOf(verb), to); });
+  play_app->add_option("--hexapod", play->hexapod, "YAML file of the hexapod")->capture_default_str();
+  play_app->add_option("--feed-scale", play->options.feed_scale,
+                       "factor on programmed feeds, above 0 to 1.2");
+  play_app->add_option("--rate-hz", play->rate_hz, "cycles a second")
+      ->check(CLI::Range(100.0, 100000.0))
+      ->capture_default_str();
+  play_app->add_option("--draw", play->out, "picture of path, struts and errors, .svg or .png");
   const auto plan = std::make_shared<ProgramVerb>();
   CLI::App* plan_app =
       AddProgramVerb(noun, output, "plan",

@@ -32,12 +32,19 @@ struct CldataVerb {
   std::string draw;
   std::string argument = "auto";
   bool six_axes = false;
+  bool hexapod = false;
 };
 
+trajectory::ToolAngles ToolAnglesOf(bool hexapod) {
+  return hexapod ? trajectory::ToolAngles::kRollPitch : trajectory::ToolAngles::kRotaryHead;
+}
+
 // A program that tilts its tool is read for six axes; whether a machine can cut it is asked by `check`.
-trajectory::PartProgram ReadAnyProgram(const std::string& text, bool six_axes) {
+trajectory::PartProgram ReadAnyProgram(const std::string& text, bool six_axes, bool hexapod = false) {
   trajectory::ReadOptions options;
-  options.cldata.axes = six_axes ? trajectory::kSixAxes : trajectory::kPlanarAxes;
+  options.cldata.axes = options.gcode.axes =
+      six_axes || hexapod ? trajectory::kSixAxes : trajectory::kPlanarAxes;
+  options.cldata.tool_angles = ToolAnglesOf(hexapod);
   trajectory::PartProgram program = ReadPartProgram(text, options);
   const auto needs_axes = [](const trajectory::ProgramFault& f) { return f.reason == "AXIS_NOT_DRIVEN"; };
   if (std::any_of(program.faults.begin(), program.faults.end(), needs_axes)) {
@@ -52,13 +59,14 @@ absl::Status WriteAsCldata(const CldataVerb& verb, Output& output) {
   if (!text.ok()) {
     return text.status();
   }
-  const trajectory::PartProgram program = ReadAnyProgram(*text, verb.six_axes);
+  const trajectory::PartProgram program = ReadAnyProgram(*text, verb.six_axes, verb.hexapod);
   if (!program.faults.empty()) {
     TellFaults(verb.file, program.faults, output);
     return absl::OkStatus();
   }
   const std::size_t name = verb.file.find_last_of('/') + 1;
-  const trajectory::CldataText cldata = WriteCldata(program.operations, verb.file.substr(name));
+  const trajectory::CldataText cldata =
+      WriteCldata(program.operations, verb.file.substr(name), {}, ToolAnglesOf(verb.hexapod));
   if (!cldata.faults.empty()) {
     TellFaults(verb.file, cldata.faults, output);
     return absl::OkStatus();
@@ -136,7 +144,7 @@ absl::Status Verify(const CldataVerb& verb, Output& output) {
   if (!text.ok()) {
     return text.status();
   }
-  const trajectory::PartProgram program = ReadAnyProgram(*text, verb.six_axes);
+  const trajectory::PartProgram program = ReadAnyProgram(*text, verb.six_axes, verb.hexapod);
   if (!program.faults.empty()) {
     TellFaults(verb.file, program.faults, output);
     return absl::OkStatus();
@@ -276,6 +284,7 @@ void AddCldataVerbs(CLI::App& noun, Output& output) {
       AddVerb(noun, output, "cldata", "a program in any notation, written as CLDATA", convert, WriteAsCldata);
   cldata->add_option("--out", convert->out, "CLDATA file; default standard output");
   cldata->add_flag("--six-axes", convert->six_axes, "read for a machine with Z and a tilting tool");
+  cldata->add_flag("--hexapod", convert->hexapod, "the same, A and B a hexapod's roll and pitch");
   const auto verified = std::make_shared<CldataVerb>();
   CLI::App* verify =
       AddVerb(noun, output, "verify",
@@ -285,6 +294,7 @@ void AddCldataVerbs(CLI::App& noun, Output& output) {
       ->check(CLI::IsMember({"auto", "path", "turn"}))
       ->capture_default_str();
   verify->add_flag("--six-axes", verified->six_axes, "read for a machine with Z and a tilting tool");
+  verify->add_flag("--hexapod", verified->hexapod, "the same, A and B a hexapod's roll and pitch");
   const auto made = std::make_shared<CldataVerb>();
   CLI::App* pilger =
       AddVerb(noun, output, "pilger", "the four-axis grinding program of a pilger die", made, Pilger);

@@ -14,57 +14,66 @@
 #include "clients/cli/program_faults.hpp"
 #include "clients/cli/text_file.hpp"
 #include "platform/machine_file/hexapod_file.hpp"
-#include "trajectory/core/part_program/gcode_reader.hpp"
-#include "trajectory/core/spatial_feed/plan_spatial_program.hpp"
+#include "trajectory/core/spatial_feed/play_spatial_plan.hpp"
 
 namespace lambdajet::cli {
 namespace {
 
 using trajectory::FeedLimit;
+using trajectory::HexapodModel;
 using trajectory::PlannedSpatialProgram;
 using trajectory::SpatialPlanSample;
 using trajectory::StrutsAt;
 
 constexpr double kDeg = 180.0 / M_PI;
 constexpr double kWidth_px = 1300.0;
+constexpr double kRoomForLegend = 1.09;  // of the time axis, so that names stand beside the curves
 constexpr std::size_t kMostCurvePoints = 4000;
 constexpr std::array<Colour, kStrutCount> kStrutColours = {kBlue, kOrange, kGreen, kRed, kViolet, kInk};
 
 struct SpatialFiles {
-  HexapodMachine machine;
-  PlannedSpatialProgram planned;
+  std::string text;
+  HexapodModel machine;
 };
 
-// The plan; nothing after the program's faults were told.
-absl::StatusOr<std::optional<SpatialFiles>> PlanFiles(const SpatialVerb& verb, Output& output) {
-  const auto text = ReadTextFile(verb.program);
+absl::StatusOr<SpatialFiles> ReadFiles(const SpatialVerb& verb) {
+  auto text = ReadTextFile(verb.program);
   auto machine = ReadHexapodFile(verb.hexapod);
   if (!text.ok() || !machine.ok()) {
     return text.ok() ? machine.status() : text.status();
   }
-  trajectory::GcodeOptions reading;
-  reading.axes = trajectory::kSixAxes;
-  reading.default_tolerance_mm = machine->motion.corner_tolerance_mm;
-  reading.kerf_compensation = false;  // the planner moves no contour
-  const trajectory::PartProgram program = trajectory::ReadGcode(*text, reading);
-  if (!program.faults.empty()) {
-    TellFaults(verb.program, program.faults, output);
-    return std::nullopt;
-  }
-  trajectory::SpatialOptions options;
-  options.feed_scale = verb.feed_scale;
-  SpatialFiles files{*machine, {}};
-  files.planned = trajectory::PlanSpatialProgram(program.operations, machine->machine_id, machine->geometry,
-                                                 machine->motion, options);
-  if (!files.planned.faults.empty()) {
-    TellFaults(verb.program, files.planned.faults, output);
-    return std::nullopt;
-  }
-  return files;
+  return SpatialFiles{*std::move(text),
+                      {machine->machine_id, HexapodHash(*machine), machine->geometry, machine->motion}};
 }
 
-void TellSummary(const SpatialFiles& files, Output& output) {
-  const PlannedSpatialProgram& p = files.planned;
+trajectory::SpatialOptions OptionsOf(const SpatialVerb& verb) {
+  trajectory::SpatialOptions options;
+  options.feed_scale = verb.feed_scale;
+  return options;
+}
+
+// The plan; nothing after the program's faults were told.
+absl::StatusOr<std::optional<PlannedSpatialProgram>> PlanFiles(const SpatialVerb& verb, HexapodModel& machine,
+                                                               Output& output) {
+  auto files = ReadFiles(verb);
+  if (!files.ok()) {
+    return files.status();
+  }
+  PlannedSpatialProgram planned =
+      PlanSpatialText(files->text, files->machine, OptionsOf(verb), [&output](double ratio) {
+        output.Progress(ratio, "planning");
+        return true;
+      });
+  output.EndProgress();
+  machine = std::move(files->machine);
+  if (!planned.faults.empty()) {
+    TellFaults(verb.program, planned.faults, output);
+    return std::nullopt;
+  }
+  return planned;
+}
+
+void TellSummary(const PlannedSpatialProgram& p, Output& output) {
   output.Text(fmt::format(
       "plan {}: {:.2f} s moving, {:.2f} s at gates; {:.1f} mm of path (a turn counts at {:.1f} mm)",
       p.plan.id, p.plan.duration_s, p.gate_time_s, p.plan.length_mm, p.plan.turn_radius_mm));
@@ -96,34 +105,41 @@ nlohmann::json SummaryJson(const PlannedSpatialProgram& p) {
           {"slow", SlowJson(p.slow)}};
 }
 
-// The planned pose at tau, between samples on the chord.
-Pose ToolAt(const PlannedSpatialProgram& p, double tau_s) {
-  const auto after = std::upper_bound(p.samples.begin(), p.samples.end(), tau_s,
-                                      [](double t, const SpatialPlanSample& s) { return t < s.tau_s; });
-  if (after == p.samples.begin() || after == p.samples.end()) {
-    const SpatialPlanSample& end = after == p.samples.begin() ? p.samples.front() : p.samples.back();
-    return {end.p_W_mm, end.q_W.toRotationMatrix()};
-  }
-  const SpatialPlanSample &a = *std::prev(after), &b = *after;
-  const double u = b.tau_s > a.tau_s ? (tau_s - a.tau_s) / (b.tau_s - a.tau_s) : 0.0;
-  return {a.p_W_mm + u * (b.p_W_mm - a.p_W_mm), a.q_W.slerp(u, b.q_W).toRotationMatrix()};
-}
-
 CsvTable PointTable(const PlannedSpatialProgram& p, double step_s) {
-  CsvTable table({"tau_s", "x_W_mm", "y_W_mm", "z_W_mm", "a_rad", "b_rad", "c_rad", "strut_1_mm",
-                  "strut_2_mm", "strut_3_mm", "strut_4_mm", "strut_5_mm", "strut_6_mm", "strut_1_mm_per_s",
-                  "strut_2_mm_per_s", "strut_3_mm_per_s", "strut_4_mm_per_s", "strut_5_mm_per_s",
-                  "strut_6_mm_per_s"});
+  CsvTable table({"tau_s",
+                  "s_mm",
+                  "x_W_mm",
+                  "y_W_mm",
+                  "z_W_mm",
+                  "a_rad",
+                  "b_rad",
+                  "c_rad",
+                  "tip_mm_per_s",
+                  "path_mm_per_s",
+                  "strut_1_mm",
+                  "strut_2_mm",
+                  "strut_3_mm",
+                  "strut_4_mm",
+                  "strut_5_mm",
+                  "strut_6_mm",
+                  "strut_1_mm_per_s",
+                  "strut_2_mm_per_s",
+                  "strut_3_mm_per_s",
+                  "strut_4_mm_per_s",
+                  "strut_5_mm_per_s",
+                  "strut_6_mm_per_s",
+                  "cutting",
+                  "source_line"});
   const auto count = static_cast<std::int64_t>(p.plan.duration_s / step_s + 1e-9);
   for (std::int64_t i = 0; i <= count; ++i) {
-    const double tau = static_cast<double>(i) * step_s;
-    const Pose tool = ToolAt(p, tau);
-    const RollPitchYaw turn = tool.roll_pitch_yaw();
-    const trajectory::StrutState struts = StrutsAt(p.plan, tau);
-    std::vector<double> row = {tau,           tool.p_mm.x(),  tool.p_mm.y(), tool.p_mm.z(),
-                               turn.roll_rad, turn.pitch_rad, turn.yaw_rad};
-    row.insert(row.end(), struts.q_mm.begin(), struts.q_mm.end());
-    row.insert(row.end(), struts.first.begin(), struts.first.end());
+    const trajectory::SpatialPlanPoint at = PointAt(p, static_cast<double>(i) * step_s);
+    std::vector<double> row = {
+        at.tau_s,         at.s_mm,           at.p_W_mm.x(),   at.p_W_mm.y(),         at.p_W_mm.z(),
+        at.turn.roll_rad, at.turn.pitch_rad, at.turn.yaw_rad, at.tip_speed_mm_per_s, at.path_speed_mm_per_s};
+    row.insert(row.end(), at.struts.q_mm.begin(), at.struts.q_mm.end());
+    row.insert(row.end(), at.struts.first.begin(), at.struts.first.end());
+    row.push_back(at.cutting ? 1.0 : 0.0);
+    row.push_back(static_cast<double>(at.line));
     table.AddRow(row);
   }
   return table;
@@ -169,6 +185,33 @@ void DrawPath(PlotFrame& frame, const PlannedSpatialProgram& p, bool by_speed, d
   }
 }
 
+// The plane Z 0 below the cuts as a grid of 20 mm, and the axes of W at its origin: what the eye needs for depth.
+void DrawPlane(PlotFrame& frame, const PlannedSpatialProgram& p) {
+  constexpr double kGrid_mm = 20.0, kAxis_mm = 25.0;
+  Eigen::Vector2d low = Eigen::Vector2d::Zero(), high = Eigen::Vector2d::Zero();
+  for (const SpatialPlanSample& s : p.samples) {
+    low = low.cwiseMin(s.p_W_mm.head<2>());
+    high = high.cwiseMax(s.p_W_mm.head<2>());
+  }
+  const auto index = [](double v) { return std::round(v / kGrid_mm); };
+  for (double i = index(low.x()) - 1; i <= index(high.x()) + 1; ++i) {
+    frame.Line({Seen({i * kGrid_mm, (index(low.y()) - 1) * kGrid_mm, 0.0}),
+                Seen({i * kGrid_mm, (index(high.y()) + 1) * kGrid_mm, 0.0})},
+               kPale, 0.7);
+  }
+  for (double i = index(low.y()) - 1; i <= index(high.y()) + 1; ++i) {
+    frame.Line({Seen({(index(low.x()) - 1) * kGrid_mm, i * kGrid_mm, 0.0}),
+                Seen({(index(high.x()) + 1) * kGrid_mm, i * kGrid_mm, 0.0})},
+               kPale, 0.7);
+  }
+  static constexpr std::array<const char*, 3> kNames = {"X", "Y", "Z"};
+  for (int i = 0; i < 3; ++i) {
+    const auto end = Seen(kAxis_mm * Eigen::Vector3d::Unit(i));
+    frame.Line({Seen(Eigen::Vector3d::Zero()), end}, kInk, 1.2);
+    frame.Text(end.first, end.second, kNames[static_cast<std::size_t>(i)]);
+  }
+}
+
 // The tool every so often along the path: from the tip towards the spindle.
 void DrawTool(PlotFrame& frame, const PlannedSpatialProgram& p, double length_mm) {
   double last = -1e9;
@@ -196,6 +239,7 @@ void DrawPathFrame(Picture& picture, PlotFrame::Place place, const PlannedSpatia
                                          fastest, p.plan.turn_radius_mm)
                            : std::string("path by what limits it"),
                   true);
+  DrawPlane(frame, p);
   DrawTool(frame, p, kTool_mm);
   DrawPath(frame, p, by_speed, fastest);
   if (!by_speed) {
@@ -224,7 +268,8 @@ void DrawStruts(Picture& picture, double top_px, const PlannedSpatialProgram& p,
   }
   const double room = 0.05 * (high - low) + 1e-9;
   PlotFrame frame(picture, {80.0, top_px, kWidth_px - 120.0, 190.0},
-                  {0.0, p.plan.duration_s, "program time, s"}, {low - room, high + room, label}, title);
+                  {0.0, kRoomForLegend * p.plan.duration_s, "program time, s"},
+                  {low - room, high + room, label}, title);
   std::vector<std::pair<std::string, Colour>> legend;
   for (std::size_t j = 0; j < kStrutCount; ++j) {
     frame.Line(curves[j], kStrutColours[j], 1.1);
@@ -233,35 +278,8 @@ void DrawStruts(Picture& picture, double top_px, const PlannedSpatialProgram& p,
   frame.Legend(legend, true);
 }
 
-}  // namespace
-
-absl::Status PlanSpatial(const SpatialVerb& verb, Output& output) {
-  const auto files = PlanFiles(verb, output);
-  if (!files.ok() || !files->has_value()) {
-    return files.status();
-  }
-  const PlannedSpatialProgram& planned = (*files)->planned;
-  if (!verb.out.empty()) {
-    if (const absl::Status status = WriteCsv(verb.out, PointTable(planned, verb.step_s)); !status.ok()) {
-      return status;
-    }
-  }
-  if (verb.out != "-") {
-    TellSummary(**files, output);
-    output.Json(SummaryJson(planned));
-  }
-  return absl::OkStatus();
-}
-
-absl::Status DrawSpatial(const SpatialVerb& verb, Output& output) {
-  const auto files = PlanFiles(verb, output);
-  if (!files.ok() || !files->has_value()) {
-    return files.status();
-  }
-  const PlannedSpatialProgram& p = (*files)->planned;
-  const HexapodMotion& m = (*files)->machine.motion;
-  Picture picture(kWidth_px, 1500.0);
-  DrawPathFrame(picture, {80.0, 50.0, kWidth_px - 120.0, 560.0}, p, verb.colour == "speed");
+void DrawAll(Picture& picture, const PlannedSpatialProgram& p, const HexapodMotion& m, bool by_speed) {
+  DrawPathFrame(picture, {80.0, 50.0, kWidth_px - 120.0, 560.0}, p, by_speed);
   DrawStruts(picture, 680.0, p, "what the struts' encoders read", "mm",
              [](const trajectory::StrutState& s) { return s.q_mm; });
   DrawStruts(picture, 960.0, p, fmt::format("strut speeds (limit {:.0f} mm/s)", m.strut_velocity_mm_per_s),
@@ -269,6 +287,149 @@ absl::Status DrawSpatial(const SpatialVerb& verb, Output& output) {
   DrawStruts(picture, 1240.0, p,
              fmt::format("strut accelerations (limit {:.0f} mm/s\u00b2)", m.strut_acceleration_mm_per_s2),
              "mm/s\u00b2", [](const trajectory::StrutState& s) { return s.second; });
+}
+
+// --- Playing.
+
+void DrawErrors(Picture& picture, double top_px, double duration_s,
+                const trajectory::SpatialPlayReport& played) {
+  Points tip, drives;
+  double high = 1e-6;
+  for (const trajectory::PlayedPoint& at : played.trace) {
+    tip.push_back({at.tau_s, 1e3 * at.tip_error_mm});
+    drives.push_back({at.tau_s, 1e3 * at.drives_tip_error_mm});
+    high = std::max({high, 1e3 * at.tip_error_mm, 1e3 * at.drives_tip_error_mm});
+  }
+  PlotFrame frame(picture, {80.0, top_px, kWidth_px - 120.0, 190.0},
+                  {0.0, kRoomForLegend * duration_s, "program time, s"}, {0.0, 1.1 * high, "\u00b5m"},
+                  "tip from the programmed path: as the plan says, and as simulated drives follow");
+  frame.Line(drives, kOrange, 1.0);
+  frame.Line(tip, kBlue, 1.2);
+  frame.Legend({{"plan", kBlue}, {"drives", kOrange}}, true);
+}
+
+struct PlayedFigure {
+  const char* what;
+  const char* key;
+  trajectory::WorstPlace worst;
+  const char* unit;
+  double limit;  // 0: none
+};
+
+std::vector<PlayedFigure> FiguresOf(const trajectory::SpatialPlayReport& p) {
+  return {
+      {"tip from the programmed path", "tip_error_mm", p.tip_error_mm, "mm", 0.0},
+      {"turn from the programmed one", "turn_error_rad", p.turn_error_rad, "rad", 0.0},
+      {"the larger in shares of tolerance", "tolerance_share", p.tolerance_share, "", 1.0},
+      {"ends of blocks missed by", "missed_end_mm", p.missed_end_mm, "mm", 0.0},
+      {"tip where simulated drives follow", "drives_tip_error_mm", p.drives_tip_error_mm, "mm", 0.0},
+      {"a strut behind its reading", "following_mm", p.following_mm, "mm", 0.0},
+      {"strut speed, of its limit", "strut_speed_share", p.strut_speed_share, "", 1.0},
+      {"strut acceleration, of its limit", "strut_acceleration_share", p.strut_acceleration_share, "", 1.0},
+      {"strut jerk, of its limit", "strut_jerk_share", p.strut_jerk_share, "", 1.0},
+      {"path acceleration, of its limit", "path_acceleration_share", p.path_acceleration_share, "", 1.0}};
+}
+
+void TellPlay(const trajectory::SpatialPlayReport& p, const HexapodMotion& m, double rate_hz,
+              Output& output) {
+  output.Text(fmt::format(
+      "played at {:.0f} Hz: {} cycles, {} without a pose; {:.3f} s predicted, {:.3f} s played "
+      "({:+.3f} %)",
+      rate_hz, p.cycles, p.unsolved, p.predicted_s, p.played_s, 100.0 * (p.played_s / p.predicted_s - 1.0)));
+  TextTable table{{"worst of", "value", "unit", "allowed", "at s", "line"}, {}};
+  nlohmann::json json = {{"cycles", p.cycles},
+                         {"unsolved", p.unsolved},
+                         {"predicted_s", p.predicted_s},
+                         {"played_s", p.played_s}};
+  bool kept = p.unsolved == 0;
+  for (const PlayedFigure& f : FiguresOf(p)) {
+    const bool exceeded = f.limit > 0.0 && f.worst.value > f.limit * (1.0 + 1e-6);
+    kept = kept && !exceeded;
+    table.rows.push_back({f.what, fmt::format("{:.6f}", f.worst.value), f.unit,
+                          f.limit > 0.0 ? fmt::format("{:.0f}", f.limit) : "", Fixed(f.worst.tau_s, 3),
+                          std::to_string(f.worst.line)});
+    json[f.key] = {{"worst", f.worst.value}, {"tau_s", f.worst.tau_s}, {"line", f.worst.line}};
+  }
+  output.Table(table);
+  output.Text(kept ? fmt::format("every limit and both tolerances ({} mm, {} rad before a G64 P) are kept",
+                                 m.corner_tolerance_mm, m.corner_tolerance_rad)
+                   : std::string("something is exceeded"),
+              kept ? Tone::kGood : Tone::kBad);
+  output.Json(json);
+  output.Exit(kept ? ExitCode::kOk : ExitCode::kRefused);
+}
+
+}  // namespace
+
+absl::Status CheckSpatial(const SpatialVerb& verb, Output& output) {
+  const auto files = ReadFiles(verb);
+  if (!files.ok()) {
+    return files.status();
+  }
+  const trajectory::SpatialAdmission admission =
+      AdmitSpatialProgram(files->text, files->machine, OptionsOf(verb));
+  if (!admission.faults.empty()) {
+    TellFaults(verb.program, admission.faults, output);
+    return absl::OkStatus();
+  }
+  output.Text(fmt::format("admitted: {:.1f} mm of feed moves, {:.1f} mm idle (turns counted as their shift)",
+                          admission.cutting_length_mm, admission.idle_length_mm),
+              Tone::kGood);
+  output.Json({{"admitted", true},
+               {"cutting_length_mm", admission.cutting_length_mm},
+               {"idle_length_mm", admission.idle_length_mm}});
+  return absl::OkStatus();
+}
+
+absl::Status PlanSpatial(const SpatialVerb& verb, Output& output) {
+  HexapodModel machine;
+  const auto answer = PlanFiles(verb, machine, output);
+  if (!answer.ok() || !answer->has_value()) {
+    return answer.status();
+  }
+  const PlannedSpatialProgram& planned = **answer;
+  if (!verb.out.empty()) {
+    if (const absl::Status status = WriteCsv(verb.out, PointTable(planned, verb.step_s)); !status.ok()) {
+      return status;
+    }
+  }
+  if (verb.out != "-") {
+    TellSummary(planned, output);
+    output.Json(SummaryJson(planned));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status DrawSpatial(const SpatialVerb& verb, Output& output) {
+  HexapodModel machine;
+  const auto answer = PlanFiles(verb, machine, output);
+  if (!answer.ok() || !answer->has_value()) {
+    return answer.status();
+  }
+  Picture picture(kWidth_px, 1500.0);
+  DrawAll(picture, **answer, machine.motion, verb.colour == "speed");
+  return picture.Write(verb.out);
+}
+
+absl::Status PlaySpatial(const SpatialVerb& verb, Output& output) {
+  HexapodModel machine;
+  const auto files = ReadFiles(verb);
+  const auto answer = PlanFiles(verb, machine, output);
+  if (!answer.ok() || !answer->has_value()) {
+    return answer.status();
+  }
+  const trajectory::PartProgram program = trajectory::ReadSpatialProgram(files->text, machine.motion);
+  trajectory::SpatialPlayOptions options;
+  options.cycle_s = 1.0 / verb.rate_hz;
+  const trajectory::SpatialPlayReport played =
+      PlaySpatialPlan(**answer, program.operations, machine, options);
+  TellPlay(played, machine.motion, verb.rate_hz, output);
+  if (verb.out.empty()) {
+    return absl::OkStatus();
+  }
+  Picture picture(kWidth_px, 1780.0);
+  DrawAll(picture, **answer, machine.motion, verb.colour == "speed");
+  DrawErrors(picture, 1520.0, (*answer)->plan.duration_s, played);
   return picture.Write(verb.out);
 }
 

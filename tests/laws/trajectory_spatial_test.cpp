@@ -9,7 +9,8 @@
 
 #include "tests/laws/trajectory_spatial_cases.hpp"
 #include "tests/laws/trajectory_spatial_reference.hpp"
-#include "trajectory/core/part_program/gcode_reader.hpp"
+#include "trajectory/core/part_program/cldata_writer.hpp"
+#include "trajectory/core/spatial_feed/play_spatial_plan.hpp"
 
 namespace lambdajet::trajectory {
 namespace {
@@ -382,15 +383,17 @@ TEST(DrillingCycle, FeedsAlongTheTiltedAxisAndDwellsAtItsBottom) {
   EXPECT_NEAR(deepest, -12.0, 1e-9);
 }
 
-// The shipped program: its cycles, read as G-code writes them, drill along the tool, and the whole of it can be planned.
-TEST(DrillingCycle, OfTheShippedProgramFollowTheToolsTilt) {
+HexapodModel WorkedModel() { return {"worked", "0123456789ab", WorkedHexapod(), WorkedMotion()}; }
+
+std::string ShippedHoles() {
   const char* folder = std::getenv("LAMBDAJET_SOURCE_DIR");
   std::ifstream file(std::string(folder) + "/deploy/parts/tilted_holes/tilted_holes.ngc");
-  const std::string text{std::istreambuf_iterator<char>(file), {}};
-  GcodeOptions options;
-  options.axes = kSixAxes;
-  options.kerf_compensation = false;
-  const PartProgram program = ReadGcode(text, options);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+// The shipped program: its cycles, read as G-code writes them, drill along the tool, and the whole of it can be planned.
+TEST(DrillingCycle, OfTheShippedProgramFollowTheToolsTilt) {
+  const PartProgram program = ReadSpatialProgram(ShippedHoles(), WorkedMotion());
   ASSERT_TRUE(program.faults.empty()) << program.faults[0].message;
   int bottoms = 0;
   for (std::size_t i = 1; i < program.operations.size(); ++i) {
@@ -406,6 +409,131 @@ TEST(DrillingCycle, OfTheShippedProgramFollowTheToolsTilt) {
   EXPECT_GE(bottoms, 9);
   const PlannedSpatialProgram planned = PlanOf(program.operations);
   EXPECT_TRUE(planned.faults.empty()) << FaultText(planned);
+}
+
+// A plan of the program as it stands, and of the same program written as CLDATA and read again.
+void ExpectSamePlanOfCldata(const std::vector<Operation>& operations, double& worst_mm, double& worst_ratio) {
+  const CldataText written = WriteCldata(operations, "part", {}, ToolAngles::kRollPitch);
+  ASSERT_TRUE(written.faults.empty()) << written.faults[0].message;
+  const PartProgram read = ReadSpatialProgram(written.text, WorkedMotion());
+  ASSERT_TRUE(read.faults.empty()) << read.faults[0].line << " " << read.faults[0].message;
+  EXPECT_EQ(WriteCldata(read.operations, "part", {}, ToolAngles::kRollPitch).text, written.text);
+  const PlannedSpatialProgram a = PlanOf(operations), b = PlanOf(read.operations);
+  ASSERT_TRUE(a.faults.empty() && b.faults.empty()) << FaultText(a) << FaultText(b);
+  ASSERT_EQ(a.plan.gates.size(), b.plan.gates.size());
+  EXPECT_NEAR(a.plan.length_mm, b.plan.length_mm, 1e-6);
+  const double ratio = std::abs(a.plan.duration_s / b.plan.duration_s - 1.0);
+  worst_ratio = std::max(worst_ratio, ratio);
+  for (double tau = 0.0; tau < a.plan.duration_s && ratio < 1e-9; tau += 0.01) {
+    const StrutVector apart = StrutsAt(a.plan, tau).q_mm - StrutsAt(b.plan, tau).q_mm;
+    worst_mm = std::max(worst_mm, apart.cwiseAbs().maxCoeff());
+  }
+}
+
+TEST(SpatialCldata, GivesThePlanOfTheSameProgramInGcode) {
+  double worst_mm = 0.0, worst_ratio = 0.0;
+  ExpectSamePlanOfCldata(ReadSpatialProgram(ShippedHoles(), WorkedMotion()).operations, worst_mm,
+                         worst_ratio);
+  std::printf("shipped holes: struts apart %.1e mm, durations %.1e\n", worst_mm, worst_ratio);
+  EXPECT_LE(worst_mm, 1e-6);
+  EXPECT_LE(worst_ratio, 1e-9);
+  for (std::uint64_t seed = 41; seed <= 46; ++seed) {
+    SCOPED_TRACE(seed);
+    std::vector<Operation> operations = RandomSpatialProgram(seed).Draw(10);
+    for (Operation& o : operations) {
+      o.c_rad = 0.0;  // an axis cannot say it
+    }
+    operations.emplace_back();  // the end
+    ExpectSamePlanOfCldata(operations, worst_mm, worst_ratio);
+  }
+  std::printf("and random ones: struts apart %.1e mm, durations %.1e\n", worst_mm, worst_ratio);
+  EXPECT_LE(worst_mm, 1e-5);
+  EXPECT_LE(worst_ratio, 5e-3);  // rounding may be a pass more or less
+}
+
+TEST(SpatialCldata, ItsToolAxisIsThatOfTheRotaryWords) {
+  std::mt19937_64 random(11);
+  std::uniform_real_distribution<> angle(-1.5, 1.5);
+  for (int i = 0; i < 1000; ++i) {
+    const HeadAngles h{angle(random), 2.0 * angle(random)};
+    const ToolAxis axis = AxisOf(ToolAngles::kRollPitch, h);
+    const Vector3d meant = RollPitchYaw{h.a_rad, h.b_rad, 0.0}.Rotation().col(2);
+    ASSERT_LE((Vector3d(axis[0], axis[1], axis[2]) - meant).norm(), 1e-14);
+    const HeadAngles back = AnglesOf(ToolAngles::kRollPitch, axis);
+    ASSERT_NEAR(back.a_rad, h.a_rad, 1e-12);
+    ASSERT_NEAR(back.b_rad, h.b_rad, 1e-12);
+  }
+}
+
+TEST(SpatialProgram, IsAdmittedOrRefusedAtTheRightCheck) {
+  const auto admit = [](const std::string& text) { return AdmitSpatialProgram(text, WorkedModel(), {}); };
+  const SpatialAdmission good = admit(ShippedHoles());
+  EXPECT_TRUE(good.faults.empty());
+  EXPECT_EQ(good.check, AdmissionCheck::kReach);
+  EXPECT_GT(good.idle_length_mm, good.cutting_length_mm);
+  const auto refused = [&](const std::string& text, AdmissionCheck check, const char* reason,
+                           std::uint32_t line) {
+    SCOPED_TRACE(text);
+    const SpatialAdmission admission = admit(text);
+    ASSERT_FALSE(admission.faults.empty());
+    EXPECT_EQ(admission.check, check);
+    EXPECT_EQ(admission.faults[0].reason, reason);
+    EXPECT_EQ(admission.faults[0].line, line);
+  };
+  refused("G0 X0 Y0 Z20\nG1 Q\nM2\n", AdmissionCheck::kParse, "BAD_NUMBER", 2);
+  refused("G0 Z20\nG1 X500 F600\nM2\n", AdmissionCheck::kPlace, "ACTUATOR_LIMIT", 2);
+  refused("G0 Z20\nG1 A45 F600\nM2\n", AdmissionCheck::kPlace, "JOINT_LIMIT", 2);
+  // Both ends can be held, the arc between them cannot.
+  refused("G0 X-60 Z20\nG3 X60 I60 J-200 F600\nM2\n", AdmissionCheck::kReach, "ACTUATOR_LIMIT", 2);
+  refused("PARTNO A\nMULTAX/ON\nFROM/0,0,20,0,0,1\nFEDRAT/600,MMPM\nGOTO/0,0,20,0,1,0\nFINI\n",
+          AdmissionCheck::kPlace, "ACTUATOR_LIMIT", 5);
+  refused("PARTNO A\nFROM/0,0,20\nCYCLE/DRILL,12,600,MMPM,2\nFINI\n", AdmissionCheck::kParse, "UNKNOWN_WORD",
+          3);
+  refused("PARTNO A\nFROM/0,0,20\nFEDRAT/600,MMPM\nCUTTER/6\nTLCOMP/LEFT\nGOTO/9,0,20\nFINI\n",
+          AdmissionCheck::kParse, "COMPENSATION_NOT_SUPPORTED", 6);
+}
+
+// Cycle by cycle at 10 kHz, against the program's own words.
+TEST(SpatialPlay, KeepsThePathTheLimitsAndTheTimeAt10kHz) {
+  const PartProgram program = ReadSpatialProgram(ShippedHoles(), WorkedMotion());
+  const PlannedSpatialProgram planned = PlanOf(program.operations);
+  ASSERT_TRUE(planned.faults.empty());
+  const SpatialPlayReport played = PlaySpatialPlan(planned, program.operations, WorkedModel());
+  std::printf(
+      "%llu cycles: tip %.4f mm, turn %.6f rad, of tolerance %.4f, ends missed by %.4f mm; of limits speed "
+      "%.4f "
+      "acceleration %.4f jerk %.4f path %.6f; drives %.4f mm, following %.4f mm; %.3f s predicted, %.3f "
+      "played\n",
+      static_cast<unsigned long long>(played.cycles), played.tip_error_mm.value, played.turn_error_rad.value,
+      played.tolerance_share.value, played.missed_end_mm.value, played.strut_speed_share.value,
+      played.strut_acceleration_share.value, played.strut_jerk_share.value,
+      played.path_acceleration_share.value, played.drives_tip_error_mm.value, played.following_mm.value,
+      played.predicted_s, played.played_s);
+  EXPECT_EQ(played.unsolved, 0u);
+  EXPECT_NEAR(static_cast<double>(played.cycles), planned.plan.duration_s * 1e4, 3.0);
+  EXPECT_LE(played.tolerance_share.value, 1.0);
+  EXPECT_LE(played.missed_end_mm.value, 0.02);
+  for (const WorstPlace& share : {played.strut_speed_share, played.strut_acceleration_share,
+                                  played.strut_jerk_share, played.path_acceleration_share}) {
+    EXPECT_GT(share.value, 0.1);
+    EXPECT_LE(share.value, 1.0 + 1e-6);
+  }
+  EXPECT_NEAR(played.played_s, played.predicted_s, 0.01 * played.predicted_s);
+}
+
+// The ruler itself: a plan of another program is told to be off by what the programs differ.
+TEST(SpatialPlay, SeesAPathThatIsNotTheProgrammedOne) {
+  const auto line = [](double y) {
+    return std::vector<Operation>{SpatialMove(OperationKind::kTraverse, {-30, y, 20}, {0, 0, 0}, 0, 1),
+                                  SpatialMove(OperationKind::kFeedLine, {30, y, 20}, {0.1, 0, 0}, 60, 2)};
+  };
+  const PlannedSpatialProgram planned = PlanOf(line(0.0));
+  SpatialPlayOptions options;
+  options.cycle_s = 1e-3;
+  EXPECT_LE(PlaySpatialPlan(planned, line(0.0), WorkedModel(), options).tip_error_mm.value, 1e-6);
+  const SpatialPlayReport off = PlaySpatialPlan(planned, line(0.5), WorkedModel(), options);
+  EXPECT_NEAR(off.tip_error_mm.value, 0.5, 0.01);
+  EXPECT_NEAR(off.missed_end_mm.value, 0.5, 0.01);
 }
 
 }  // namespace

@@ -900,8 +900,9 @@ class Reader {
     o.y_W_mm = p[1];
     if (Has(kAxisZ)) {
       o.z_W_mm = p[2];
-      o.a_rad = std::atan2(-axis_[1], axis_[2]);
-      o.b_rad = std::atan2(axis_[0], std::hypot(axis_[1], axis_[2]));
+      const HeadAngles angles = AnglesOf(options_.tool_angles, axis_);
+      o.a_rad = angles.a_rad;
+      o.b_rad = angles.b_rad;
     }
   }
 

@@ -6,7 +6,7 @@
 // another statement between, as far as they lie on it: each is reached the shorter way round from the one before, which
 // gives the direction (posts disagree on what the axis' sign means); half a turn or more between two points is refused.
 // MOVARC says direction (right-handed about its axis) and angle itself. MULTAX lets GOTO carry the tool's axis (i, j, k),
-// kept as the angles of (i, j, k) = Rx(a) Ry(b) z with b within a right angle.
+// kept as the rotary words A and B that the machine means by it (tool_axis.hpp).
 // Frames: part coordinates are W. Units: as UNITS says in (millimetres before it), mm and mm/s out. Threads: pure.
 // Cost: about 0.5 us a line. Errors: as the G-code reader, the same reasons for the same troubles.
 #pragma once
@@ -15,11 +15,13 @@
 #include <string_view>
 
 #include "trajectory/core/part_program/operation.hpp"
+#include "trajectory/core/part_program/tool_axis.hpp"
 
 namespace lambdajet::trajectory {
 
 struct CldataOptions {
-  std::uint8_t axes = kPlanarAxes;          // of the machine: kPlanarAxes or kSixAxes
+  std::uint8_t axes = kPlanarAxes;  // of the machine: kPlanarAxes or kSixAxes
+  ToolAngles tool_angles = ToolAngles::kRotaryHead;
   double arc_radius_tolerance_mm = 0.0127;  // how far a point may lie from its circle
   double largest_coordinate_mm = 1e6;
   std::size_t fault_limit = 100;

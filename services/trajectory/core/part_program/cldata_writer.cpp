@@ -39,15 +39,11 @@ std::string Twelve(double value) {
   return std::string(text) == "-0.000000000000" ? "0.000000000000" : text;
 }
 
-Vector AxisOf(double a, double b) {
-  return {std::sin(b), -std::sin(a) * std::cos(b), std::cos(a) * std::cos(b)};
-}
-
 // The axis to twelve decimals, rounded until reading and writing it again changes nothing.
-std::string AxisText(double a, double b) {
+std::string AxisText(ToolAngles meaning, HeadAngles angles) {
   std::string text;
   for (int i = 0; i < kSettlingLimit; ++i) {
-    const Vector axis = AxisOf(a, b);
+    const Vector axis = AxisOf(meaning, angles);
     Vector read;
     std::string next;
     for (std::size_t k = 0; k < 3; ++k) {
@@ -56,9 +52,7 @@ std::string AxisText(double a, double b) {
       next += "," + number;
     }
     const double length = std::sqrt(read[0] * read[0] + read[1] * read[1] + read[2] * read[2]);
-    const Vector unit = {read[0] / length, read[1] / length, read[2] / length};
-    a = std::atan2(-unit[1], unit[2]);
-    b = std::atan2(unit[0], std::hypot(unit[1], unit[2]));
+    angles = AnglesOf(meaning, {read[0] / length, read[1] / length, read[2] / length});
     if (next == text) {
       break;
     }
@@ -69,6 +63,8 @@ std::string AxisText(double a, double b) {
 
 class Writer {
  public:
+  explicit Writer(ToolAngles tool_angles) : tool_angles_(tool_angles) {}
+
   CldataText Write(const std::vector<Operation>& operations, std::string_view part,
                    const std::vector<std::string>& notes) {
     result_.text.reserve(operations.size() * 48 + 200);
@@ -204,9 +200,12 @@ class Writer {
   }
 
   void Motion(const Operation& o) {
-    if (o.c_rad != 0.0 || std::abs(o.b_rad) > 0.5 * kPi || std::abs(o.a_rad) > kPi) {
+    const bool head = tool_angles_ == ToolAngles::kRotaryHead;
+    const double quarter = head ? o.b_rad : o.a_rad, half = head ? o.a_rad : o.b_rad;
+    if (o.c_rad != 0.0 || std::abs(quarter) > 0.5 * kPi || std::abs(half) > kPi) {
       Fault(o, "AXIS_NOT_WRITABLE",
-            "a tool's axis is written by A within half a turn, B within a quarter and no C");
+            head ? "a tool's axis is written by A within half a turn, B within a quarter and no C"
+                 : "a tool's axis is written by B within half a turn, A within a quarter and no C");
       return;
     }
     SetKerf(o.kerf_offset_mm);
@@ -270,10 +269,11 @@ class Writer {
 
   void Goto(const Vector& p, const Operation& o) {
     Line("GOTO/" + Exact(p[0]) + "," + Exact(p[1]) + "," + Exact(p[2]) +
-         (multax_ ? AxisText(o.a_rad, o.b_rad) : ""));
+         (multax_ ? AxisText(tool_angles_, {o.a_rad, o.b_rad}) : ""));
   }
 
   CldataText result_;
+  ToolAngles tool_angles_;
   bool multax_ = false;
   Vector position_{};
   std::string feed_;
@@ -287,8 +287,8 @@ class Writer {
 }  // namespace
 
 CldataText WriteCldata(const std::vector<Operation>& operations, std::string_view part,
-                       const std::vector<std::string>& notes) {
-  return Writer().Write(operations, part, notes);
+                       const std::vector<std::string>& notes, ToolAngles tool_angles) {
+  return Writer(tool_angles).Write(operations, part, notes);
 }
 
 }  // namespace lambdajet::trajectory

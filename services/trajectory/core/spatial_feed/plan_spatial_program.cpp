@@ -73,8 +73,16 @@ class ProgramPlanner {
  public:
   ProgramPlanner(const SpatialModel& model, PlannedSpatialProgram& out) : model_(model), out_(out) {}
 
-  void Plan(const SpatialPath& path) {
+  // False where it was stopped.
+  bool Plan(const SpatialPath& path, const PlanProgress& progress) {
+    double whole_mm = 0.0;
     for (const SpatialRun& run : path.runs) {
+      whole_mm += run.length_mm();
+    }
+    for (const SpatialRun& run : path.runs) {
+      if (progress && !progress(whole_mm > 0.0 ? s_mm_ / whole_mm : 0.0)) {
+        return false;
+      }
       Events(run);
       if (!run.pieces.empty()) {
         Append(PlanSpatialStretch(model_, run, s_mm_));
@@ -85,11 +93,12 @@ class ProgramPlanner {
         Append(RestAt(model_, path.start, s_mm_));
       }
       if (!out_.faults.empty()) {
-        return;
+        return true;
       }
       CloseGate(run);
     }
     Finish();
+    return true;
   }
 
  private:
@@ -180,7 +189,8 @@ class ProgramPlanner {
 
 PlannedSpatialProgram PlanSpatialProgram(const std::vector<Operation>& operations,
                                          const std::string& machine_id, const HexapodGeometry& geometry,
-                                         const HexapodMotion& motion, const SpatialOptions& options) {
+                                         const HexapodMotion& motion, const SpatialOptions& options,
+                                         const PlanProgress& progress) {
   const SpatialModel model(geometry, motion, options);
   PlannedSpatialProgram out;
   out.plan.id = IdOf(operations, geometry, motion, options);
@@ -188,10 +198,8 @@ PlannedSpatialProgram PlanSpatialProgram(const std::vector<Operation>& operation
   out.plan.turn_radius_mm = model.turn_radius_mm;
   const SpatialPath path = MakeSpatialPath(operations, motion, model.turn_radius_mm, options.feed_scale);
   out.faults = path.faults;
-  if (out.faults.empty()) {
-    ProgramPlanner(model, out).Plan(path);
-  }
-  if (!out.faults.empty()) {
+  const bool finished = !out.faults.empty() || ProgramPlanner(model, out).Plan(path, progress);
+  if (!out.faults.empty() || !finished) {
     out.plan.segments.clear();
   }
   return out;

@@ -10,12 +10,14 @@
 // Tolerance: for every planned pose there is a programmed one within corner tolerance of the tip and of the turn, and every
 // programmed corner is come as near to.
 // Frames: W in, struts' encoders out. Units: mm, rad, s. Threads: pure; the same inputs give the same plan bit for bit.
-// Cost: about 5 us a millisecond of program time. Errors: faults with line and reason; no plan then.
+// Cost: about 5 us a millisecond of program time. Errors: faults with line and reason; no plan then. Neither where `progress`
+// stopped it.
 #pragma once
 
 #include <string>
 #include <vector>
 
+#include "trajectory/core/feed/plan_program.hpp"
 #include "trajectory/core/spatial_feed/spatial_stretch.hpp"
 
 namespace lambdajet::trajectory {
@@ -37,7 +39,8 @@ struct PlannedSpatialProgram {
 
 PlannedSpatialProgram PlanSpatialProgram(const std::vector<Operation>& operations,
                                          const std::string& machine_id, const HexapodGeometry& geometry,
-                                         const HexapodMotion& motion, const SpatialOptions& options);
+                                         const HexapodMotion& motion, const SpatialOptions& options,
+                                         const PlanProgress& progress = {});
 
 // Struts' readings and speeds at tau; beyond the ends the end.
 StrutState StrutsAt(const SpatialPlan& plan, double tau_s);

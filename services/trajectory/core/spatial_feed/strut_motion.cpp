@@ -1,5 +1,6 @@
 #include "trajectory/core/spatial_feed/strut_motion.hpp"
 
+#include <cmath>
 #include <cstdio>
 
 #include "kinematics/core/hexapod_singularity.hpp"
@@ -8,6 +9,15 @@ namespace lambdajet::trajectory {
 namespace {
 
 constexpr double kDegrees = 180.0 / static_cast<double>(EIGEN_PI);
+
+double WithoutMinusZero(double value) { return std::abs(value) < 0.005 ? 0.0 : value; }
+
+const char* UnitOf(kinematics::HexapodBound bound) {
+  using kinematics::HexapodBound;
+  return bound == HexapodBound::kStrutMin || bound == HexapodBound::kStrutMax ? "mm"
+         : bound == HexapodBound::kSingularMargin                             ? "mm/mm"
+                                                                              : "rad";
+}
 
 // W against the tool as it stands at A0 B0 C0; its own inverse.
 Eigen::Matrix3d HalfTurn() { return Eigen::Vector3d(1, -1, -1).asDiagonal(); }
@@ -50,10 +60,12 @@ bool StrutMotion::Reaches(const Eigen::Vector3d& p_W_mm, const Eigen::Quaternion
   char text[320];
   std::snprintf(
       text, sizeof text,
-      "the machine cannot hold the tool at X%.3f Y%.3f Z%.3f A%.2f B%.2f C%.2f deg: beyond %s%s by %.3g "
-      "(mm, rad or mm/mm); move the part or tilt less",
-      p_W_mm.x(), p_W_mm.y(), p_W_mm.z(), r.roll_rad * kDegrees, r.pitch_rad * kDegrees, r.yaw_rad * kDegrees,
-      std::string(kinematics::BoundName(answer.bound)).c_str(), strut.c_str(), answer.excess);
+      "the machine cannot hold the tool at X%.3f Y%.3f Z%.3f A%.2f B%.2f C%.2f deg: beyond %s%s by %.3g %s; "
+      "move the part or tilt less",
+      p_W_mm.x(), p_W_mm.y(), p_W_mm.z(), WithoutMinusZero(r.roll_rad * kDegrees),
+      WithoutMinusZero(r.pitch_rad * kDegrees), WithoutMinusZero(r.yaw_rad * kDegrees),
+      std::string(kinematics::BoundName(answer.bound)).c_str(), strut.c_str(), answer.excess,
+      UnitOf(answer.bound));
   fault = {line, 0, kinematics::ReasonName(answer.reason), "", text};
   return false;
 }
