@@ -78,6 +78,9 @@ class ProgramPlanner {
     double whole_mm = 0.0;
     for (const SpatialRun& run : path.runs) {
       whole_mm += run.length_mm();
+      for (const SpatialPiece& piece : run.pieces) {
+        out_.cutting_length_mm += piece.cutting ? piece.length_mm : 0.0;
+      }
     }
     for (const SpatialRun& run : path.runs) {
       if (progress && !progress(whole_mm > 0.0 ? s_mm_ / whole_mm : 0.0)) {

@@ -30,6 +30,7 @@ struct PlannedSpatialProgram {
   std::vector<SlowStretch> slow;
   double tip_deviation_mm = 0.0;  // largest, from the programmed path
   double turn_deviation_rad = 0.0;
+  double cutting_length_mm = 0.0;  // of feed moves, along the path length
   double cutting_time_s = 0.0;
   double gate_time_s = 0.0;
   double singular_margin_ratio = 0.0;  // singular, over the samples, mm/mm

@@ -11,6 +11,7 @@
 
 #include "trajectory/core/feed/smoothing.hpp"
 #include "trajectory/core/feed/speed_profile.hpp"
+#include "trajectory/core/part_program/read_program.hpp"
 #include "trajectory/core/spatial_feed/spatial_path.hpp"
 #include "trajectory/core/spatial_feed/strut_motion.hpp"
 
@@ -20,6 +21,7 @@ struct SpatialOptions {
   double feed_scale = 1.0;  // of programmed feeds, (0, 1.2]
   double knot_s = 0.002;
   int knots_per_segment = 4;
+  ProgramNotation notation = ProgramNotation::kByContent;  // of a text
 };
 
 // What every run of a program is planned with.

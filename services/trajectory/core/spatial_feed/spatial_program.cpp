@@ -4,8 +4,6 @@
 #include <cstring>
 #include <iterator>
 
-#include "trajectory/core/part_program/read_program.hpp"
-
 namespace lambdajet::trajectory {
 namespace {
 
@@ -54,8 +52,9 @@ void CheckReach(const SpatialModel& model, const SpatialPath& path, std::vector<
 
 }  // namespace
 
-PartProgram ReadSpatialProgram(std::string_view text, const HexapodMotion& motion) {
+PartProgram ReadSpatialProgram(std::string_view text, const HexapodMotion& motion, ProgramNotation notation) {
   ReadOptions options;
+  options.notation = notation;
   options.gcode.axes = options.cldata.axes = kSixAxes;
   options.gcode.default_tolerance_mm = motion.corner_tolerance_mm;
   options.gcode.kerf_compensation = false;
@@ -74,7 +73,7 @@ PartProgram ReadSpatialProgram(std::string_view text, const HexapodMotion& motio
 SpatialAdmission AdmitSpatialProgram(std::string_view text, const HexapodModel& hexapod,
                                      const SpatialOptions& options) {
   SpatialAdmission admission;
-  PartProgram program = ReadSpatialProgram(text, hexapod.motion);
+  PartProgram program = ReadSpatialProgram(text, hexapod.motion, options.notation);
   admission.check = AdmissionCheck::kParse;
   admission.faults = std::move(program.faults);
   if (!admission.faults.empty()) {
@@ -105,12 +104,13 @@ std::uint64_t SpatialPlanIdOf(std::string_view text, const HexapodModel& hexapod
   id = Mixed(Mixed(id, hexapod.machine_id), hexapod.hash);
   id = Mixed(Mixed(id, options.feed_scale), options.knot_s);
   id = Mixed(id, static_cast<double>(options.knots_per_segment));
+  id = Mixed(id, static_cast<double>(options.notation));
   return id == 0 ? 1 : id;
 }
 
 PlannedSpatialProgram PlanSpatialText(std::string_view text, const HexapodModel& hexapod,
                                       const SpatialOptions& options, const PlanProgress& progress) {
-  PartProgram program = ReadSpatialProgram(text, hexapod.motion);
+  PartProgram program = ReadSpatialProgram(text, hexapod.motion, options.notation);
   PlannedSpatialProgram planned;
   planned.faults = std::move(program.faults);
   if (planned.faults.empty()) {

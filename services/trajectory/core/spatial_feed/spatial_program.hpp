@@ -12,6 +12,7 @@
 #include <string_view>
 #include <vector>
 
+#include "trajectory/core/part_program/read_program.hpp"
 #include "trajectory/core/spatial_feed/plan_spatial_program.hpp"
 
 namespace lambdajet::trajectory {
@@ -24,7 +25,8 @@ struct HexapodModel {
   HexapodMotion motion;
 };
 
-PartProgram ReadSpatialProgram(std::string_view text, const HexapodMotion& motion);
+PartProgram ReadSpatialProgram(std::string_view text, const HexapodMotion& motion,
+                               ProgramNotation notation = ProgramNotation::kByContent);
 
 enum class AdmissionCheck : std::uint8_t { kParse, kPlace, kReach };
 
