@@ -308,7 +308,7 @@ TEST_P(PlanLaws, HoldOnRandomPrograms) {
     ExpectMonotone(planned.plan);
     ExpectClosedGates(planned.plan);
     ExpectContour(m, text, planned, worst);
-    if (HasFailure()) {
+    if (HasFatalFailure()) {
       break;
     }
   }

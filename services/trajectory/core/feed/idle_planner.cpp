@@ -138,8 +138,7 @@ std::optional<IdleMove> FromRest(const PlanningModel& model, const Vector2d& fro
       return std::nullopt;
     }
     if (verdict == Verdict::kGood) {
-      return TrapezoidOf((to - from).norm(), speed, acceleration,
-                         model.filter.first_width * model.filter.knot_s);
+      return TrapezoidOf((to - from).norm(), speed, acceleration, model.filter.first_s);
     }
     speed *= 0.95;
     acceleration *= 0.95 * 0.95;

@@ -17,13 +17,23 @@ constexpr double kCellOfRadius = 0.1;
 constexpr double kKinkNode_rad = 0.02;     // a kink above this has a node of its own
 constexpr double kTurningWindow_mm = 0.5;  // either side
 constexpr double kSmoothKink_rad = 0.35;   // kinks below this count as curvature of a polygon
+constexpr double kShareOfTolerance = 0.9;  // that a corner may use up
+constexpr double kShortestNear_mm = 0.02;
 constexpr double kSamePlace_mm = 1e-3;
 constexpr int kFewestCells = 4;
 constexpr std::array<double, 3> kNearEnds_mm = {0.03, 0.1, 0.3};  // where speed changes fast over little way
 
-struct Kink {
+struct SmallKink {
   double offset_mm;
   double turning;  // prefix sum of signed small turnings up to and with this kink
+};
+
+// How the place between two pieces is crossed.
+struct Kink {
+  double angle = 0.0;
+  double speed_mm_per_s = 1e9;
+  FeedLimit reason = FeedLimit::kFeed;
+  double hold_mm = 0.0;  // the speed is kept this far either side
 };
 
 class NodeBuilder {
@@ -36,9 +46,12 @@ class NodeBuilder {
     longest_ = std::min(kLongestCell_mm, total / kFewestCells);
     shortest_ = std::min(kShortestCell_mm, 0.5 * longest_);
     AddNode(0, 0.0, model_.machine.path.feed_mm_per_s, FeedLimit::kFeed);
+    Kink before, after;
     for (std::size_t i = 0; i < run_.pieces.size() && faults_.empty(); ++i) {
-      Inside(i);
-      Join(i, total);
+      after = i + 1 < run_.pieces.size() ? KinkAfter(i) : Kink{};
+      Inside(i, before, after);
+      Join(i, after, total);
+      before = after;
     }
     AddPolygonCurvature();
     return std::move(nodes_);
@@ -46,7 +59,7 @@ class NodeBuilder {
 
  private:
   // Nodes strictly inside a piece.
-  void Inside(std::size_t i) {
+  void Inside(std::size_t i, const Kink& before, const Kink& after) {
     const PathPiece& piece = run_.pieces[i];
     double cell = longest_;
     if (piece.radius_mm != 0.0) {
@@ -57,26 +70,54 @@ class NodeBuilder {
     }
     const int count = static_cast<int>(std::ceil(piece.length_mm / cell));
     const double step = piece.length_mm / count;
+    const double most = count > 1 ? step : 0.5 * piece.length_mm;  // that ends' own nodes reach
     const bool fine = step > 2.0 * kNearEnds_mm.back();
-    for (std::size_t k = 0; fine && k < kNearEnds_mm.size(); ++k) {
-      AddInside(i, kNearEnds_mm[k]);
-    }
+    NearEnd(i, before.hold_mm, fine, most, [](double near) { return near; });
     for (int k = 1; k < count; ++k) {
       AddInside(i, step * k);
     }
-    for (std::size_t k = kNearEnds_mm.size(); fine && k-- > 0;) {
-      AddInside(i, piece.length_mm - kNearEnds_mm[k]);
+    NearEnd(i, after.hold_mm, fine, most, [&](double near) { return piece.length_mm - near; });
+    std::sort(nodes_.begin() + static_cast<std::ptrdiff_t>(piece_begin_), nodes_.end(),
+              [](const ProfileNode& a, const ProfileNode& b) { return a.offset_mm < b.offset_mm; });
+  }
+
+  // Where a kink's speed is no longer kept, and where speed changes fast.
+  template <class Place>
+  void NearEnd(std::size_t i, double hold_mm, bool fine, double most_mm, Place place) {
+    const bool own = hold_mm > kSamePlace_mm && hold_mm < most_mm - kSamePlace_mm;
+    if (own) {
+      AddInside(i, place(hold_mm));
+    }
+    for (const double near : kNearEnds_mm) {
+      if (fine && !(own && std::abs(near - hold_mm) < kShortestNear_mm)) {
+        AddInside(i, place(near));
+      }
     }
   }
 
   void AddInside(std::size_t i, double offset_mm) {
     if (faults_.empty()) {
       AddNode(i, offset_mm, run_.pieces[i].feed_mm_per_s, FeedLimit::kFeed);
+      if (nodes_.back().offset_mm <= held_to_mm_) {
+        LowerCap(nodes_.back(), held_speed_, held_reason_);
+      }
     }
   }
 
+  Kink KinkAfter(std::size_t i) {
+    const PathPiece& piece = run_.pieces[i];
+    const PathPiece& next = run_.pieces[i + 1];
+    const Vector2d u = PointOn(piece, piece.length_mm).tangent;
+    const Vector2d v = PointOn(next, 0.0).tangent;
+    Kink kink;
+    kink.angle = std::atan2(u.x() * v.y() - u.y() * v.x(), u.dot(v));
+    kink.speed_mm_per_s = std::min(piece.feed_mm_per_s, next.feed_mm_per_s);
+    LimitKink(std::min(piece.tolerance_mm, next.tolerance_mm), kink);
+    return kink;
+  }
+
   // The place between piece i and the next, or the end.
-  void Join(std::size_t i, double total) {
+  void Join(std::size_t i, const Kink& kink, double total) {
     const PathPiece& piece = run_.pieces[i];
     const double here = piece.begin_mm + piece.length_mm;
     if (i + 1 == run_.pieces.size()) {
@@ -84,30 +125,37 @@ class NodeBuilder {
       nodes_.back().offset_mm = total;
       return;
     }
-    const PathPiece& next = run_.pieces[i + 1];
-    const Vector2d u = PointOn(piece, piece.length_mm).tangent;
-    const Vector2d v = PointOn(next, 0.0).tangent;
-    const double angle = std::atan2(u.x() * v.y() - u.y() * v.x(), u.dot(v));
-    if (std::abs(angle) < kSmoothKink_rad && std::abs(angle) > 1e-9) {
-      turning_ += angle;
+    if (std::abs(kink.angle) < kSmoothKink_rad && std::abs(kink.angle) > 1e-9) {
+      turning_ += kink.angle;
       kinks_.push_back({here, turning_});
     }
-    double speed = std::min(piece.feed_mm_per_s, next.feed_mm_per_s);
-    FeedLimit reason = FeedLimit::kFeed;
-    LimitKink(std::abs(angle), std::min(piece.tolerance_mm, next.tolerance_mm), speed, reason);
-    const bool own = std::abs(angle) > kKinkNode_rad;
+    const bool own = std::abs(kink.angle) > kKinkNode_rad;
     if (own || here - nodes_.back().offset_mm >= shortest_) {
       if (own && here - nodes_.back().offset_mm < kSamePlace_mm && nodes_.size() > 1) {
-        LowerCap(nodes_.back(), speed, reason);
-        return;
+        LowerCap(nodes_.back(), kink.speed_mm_per_s, kink.reason);
+      } else {
+        AddNode(i + 1, 0.0, kink.speed_mm_per_s, kink.reason);
+        // The incoming piece's curvature holds up to here.
+        nodes_.back().curvature =
+            std::max(nodes_.back().curvature, std::abs(piece.curvature()) * model_.overshoot);
       }
-      AddNode(i + 1, 0.0, speed, reason);
-      // The incoming piece's curvature holds up to here.
-      nodes_.back().curvature =
-          std::max(nodes_.back().curvature, std::abs(piece.curvature()) * model_.overshoot);
     } else {
-      LowerCap(nodes_.back(), speed, reason);
+      LowerCap(nodes_.back(), kink.speed_mm_per_s, kink.reason);
     }
+    if (own) {
+      Hold(here, kink);
+    }
+    piece_begin_ = nodes_.size();
+  }
+
+  // Nodes already there, and those to come, within the hold.
+  void Hold(double here, const Kink& kink) {
+    for (std::size_t k = nodes_.size(); k-- > 0 && nodes_[k].offset_mm >= here - kink.hold_mm - 1e-9;) {
+      LowerCap(nodes_[k], kink.speed_mm_per_s, kink.reason);
+    }
+    held_to_mm_ = here + kink.hold_mm + 1e-9;
+    held_speed_ = kink.speed_mm_per_s;
+    held_reason_ = kink.reason;
   }
 
   static void LowerCap(ProfileNode& node, double speed, FeedLimit reason) {
@@ -117,24 +165,25 @@ class NodeBuilder {
     }
   }
 
-  void LimitKink(double angle, double tolerance_mm, double& speed, FeedLimit& reason) const {
+  void LimitKink(double tolerance_mm, Kink& kink) const {
+    const double angle = std::abs(kink.angle);
     const double change = 2.0 * std::sin(0.5 * angle);  // of velocity, per speed
     if (change < 1e-9) {
       return;
     }
     const auto lower = [&](double limit, FeedLimit why) {
-      if (limit < speed) {
-        speed = limit;
-        reason = why;
+      if (limit < kink.speed_mm_per_s) {
+        kink.speed_mm_per_s = limit;
+        kink.reason = why;
       }
     };
-    const double sigma = std::sqrt(model_.filter.variance_s2());
-    lower(0.9 * tolerance_mm / (model_.kink_deviation_s * change), FeedLimit::kCorner);
+    const double deviation_mm = kShareOfTolerance * tolerance_mm;
     if (angle > kKinkNode_rad) {
-      // The kernel's peak is 0.4/sigma. Braking before and speeding up after the kink point the same way as its own change
-      // of velocity, by sin(angle/2) each.
-      const double room = 1.0 - std::sin(0.5 * angle);
-      lower(0.7 * room * model_.path_acceleration_mm_per_s2 * sigma / (0.4 * change), FeedLimit::kCorner);
+      const CornerRule::Crossing crossing = model_.corner.Cross(angle, deviation_mm, kink.speed_mm_per_s);
+      lower(crossing.speed_mm_per_s, FeedLimit::kCorner);
+      kink.hold_mm = crossing.hold_mm;
+    } else {
+      lower(deviation_mm / (model_.kink_deviation_s * change), FeedLimit::kCorner);
     }
     const double lag = model_.options.compensate ? model_.machine.process.jet_lag_time_s : 0.0;
     if (lag > 0.0) {
@@ -210,8 +259,12 @@ class NodeBuilder {
   const PathElement& run_;
   std::vector<ProgramFault>& faults_;
   std::vector<ProfileNode> nodes_;
-  std::vector<Kink> kinks_;
+  std::vector<SmallKink> kinks_;
   double turning_ = 0.0;
+  std::size_t piece_begin_ = 1;  // first node inside the piece at hand
+  double held_to_mm_ = -1.0;
+  double held_speed_ = 0.0;
+  FeedLimit held_reason_ = FeedLimit::kCorner;
   double longest_ = kLongestCell_mm;
   double shortest_ = kShortestCell_mm;
 };

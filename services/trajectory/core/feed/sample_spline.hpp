@@ -15,13 +15,17 @@ namespace lambdajet::trajectory {
 
 inline constexpr double kStanding2_mm2 = 1e-18;  // of way over two samples
 
-// Running mean over an odd number of samples; ends are held. The sum is taken anew now and then, so that rounding does not
-// add up over a long program.
+// Samples either side of the middle one that count in full in an average over `width`.
+inline std::ptrdiff_t WholeHalf(double width) { return static_cast<std::ptrdiff_t>(0.5 * (width - 1.0)); }
+
+// Running mean over `width` samples about each, of which the two outermost count by the width's fraction; ends are held. The
+// sum is taken anew now and then, so that rounding does not add up over a long program.
 template <class Sample>
-void MovingAverage(const std::vector<Sample>& in, int width, std::vector<Sample>& out) {
+void MovingAverage(const std::vector<Sample>& in, double width, std::vector<Sample>& out) {
   constexpr std::size_t kFresh = 256;
   const auto n = static_cast<std::ptrdiff_t>(in.size());
-  const std::ptrdiff_t half = width / 2;
+  const std::ptrdiff_t half = WholeHalf(width);
+  const double edge = 0.5 * (width - 1.0) - static_cast<double>(half);
   const auto at = [&](std::ptrdiff_t i) -> const Sample& {
     return in[static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(i, 0, n - 1))];
   };
@@ -36,14 +40,14 @@ void MovingAverage(const std::vector<Sample>& in, int width, std::vector<Sample>
     } else {
       sum += at(i + half) - at(i - half - 1);
     }
-    out[static_cast<std::size_t>(i)] = sum / width;
+    out[static_cast<std::size_t>(i)] = (sum + edge * (at(i - half - 1) + at(i + half + 1))) / width;
   }
 }
 
 // Outward correction by half the variance times the normal acceleration, averaged over `width` samples: where curvature
 // jumps, the sharp correction's own jerk would be larger than that of the path. What stands stays where it is.
 template <int kPlace, class Sample>
-void CorrectOutwards(const std::vector<Sample>& in, double half_variance_samples, int width,
+void CorrectOutwards(const std::vector<Sample>& in, double half_variance_samples, double width,
                      std::vector<Sample>& out) {
   using Place = Eigen::Matrix<double, kPlace, 1>;
   const auto along_at = [&](std::size_t i) -> Place {
@@ -73,13 +77,13 @@ template <int kPlace, class Sample>
 std::vector<Sample> SmoothSamples(const SmoothingFilter& filter, const std::vector<Sample>& samples) {
   std::vector<Sample> a, b;
   CorrectOutwards<kPlace>(samples, 0.5 * filter.variance_s2() / (filter.knot_s * filter.knot_s),
-                          filter.correction_width, a);
-  MovingAverage(a, filter.first_width, b);
-  MovingAverage(b, filter.second_width, a);
-  if (filter.third_width == 1) {
+                          filter.correction_s / filter.knot_s, a);
+  MovingAverage(a, filter.first_s / filter.knot_s, b);
+  MovingAverage(b, filter.second_s / filter.knot_s, a);
+  if (filter.third_s <= filter.knot_s) {
     return a;
   }
-  MovingAverage(a, filter.third_width, b);
+  MovingAverage(a, filter.third_s / filter.knot_s, b);
   return b;
 }
 

@@ -11,8 +11,17 @@ namespace {
 // Of T1: wider, and the contour is left further where curvature jumps; narrower, and the jerk is higher there.
 constexpr double kCorrectionShare = 0.5;
 
-int OddWidth(double duration_s, double knot_s) {
-  return 2 * static_cast<int>(std::ceil(0.5 * (duration_s / knot_s - 1.0) - 1e-9)) + 1;
+// Samples either side that an average of this width takes from.
+int ReachOf(double width) {
+  const auto whole = static_cast<double>(WholeHalf(width));
+  return static_cast<int>(whole) + (0.5 * (width - 1.0) > whole ? 1 : 0);
+}
+
+// Of one average, in squares of samples.
+double VarianceOf(double width) {
+  const auto half = static_cast<double>(WholeHalf(width));
+  const double edge = 0.5 * (width - 1.0) - half;
+  return (half * (half + 1.0) * (2.0 * half + 1.0) / 3.0 + 2.0 * edge * (half + 1.0) * (half + 1.0)) / width;
 }
 
 }  // namespace
@@ -24,17 +33,21 @@ SmoothingFilter SmoothingFilter::ForLimits(double knot_s, double acceleration_mm
   // From nothing to the limit within T1. Where it turns from one sign to the other, the planner finds the jerk too high
   // and slows there.
   const double t1 = acceleration_mm_per_s2 / jerk_mm_per_s3;
-  filter.first_width = std::max(1, OddWidth(t1, knot_s));
+  filter.first_s = std::max(knot_s, t1);
   const double t2 = std::max(0.25 * t1, std::sqrt(ramp_s2));
-  filter.second_width = std::max(1, OddWidth(t2, knot_s));
-  filter.correction_width = OddWidth(kCorrectionShare * t1, knot_s);
-  filter.third_width = ramp_s2 > 0.0 ? std::max(1, OddWidth(ramp_s2 / t2, knot_s)) : 1;
+  filter.second_s = std::max(knot_s, t2);
+  filter.correction_s = std::max(knot_s, kCorrectionShare * t1);
+  filter.third_s = ramp_s2 > 0.0 ? std::max(knot_s, ramp_s2 / t2) : knot_s;
   return filter;
 }
 
+int SmoothingFilter::reach() const {
+  return ReachOf(first_s / knot_s) + ReachOf(second_s / knot_s) + ReachOf(third_s / knot_s) + 3;
+}
+
 double SmoothingFilter::variance_s2() const {
-  const double n1 = first_width, n2 = second_width, n3 = third_width;
-  return knot_s * knot_s * ((n1 * n1 - 1.0) / 12.0 + (n2 * n2 - 1.0) / 12.0 + (n3 * n3 - 1.0) / 12.0 + 0.5);
+  return knot_s * knot_s *
+         (VarianceOf(first_s / knot_s) + VarianceOf(second_s / knot_s) + VarianceOf(third_s / knot_s) + 0.5);
 }
 
 namespace {
@@ -42,7 +55,7 @@ namespace {
 // The filter's answer, in y, to a motion along x whose y is given: as the planner will make it.
 template <class Shape, class Take>
 void Answer(const SmoothingFilter& filter, Shape y, Take take) {
-  const int reach = filter.reach() + filter.correction_width / 2 + 1;
+  const int reach = filter.reach() + ReachOf(filter.correction_s / filter.knot_s) + 1;
   const int n = 4 * reach + 8;
   std::vector<PathSample> in(static_cast<std::size_t>(n), PathSample::Zero());
   for (int i = 0; i < n; ++i) {

@@ -19,10 +19,11 @@ using PathSample = Eigen::Vector3d;  // x, y, path length
 
 struct SmoothingFilter {
   double knot_s = 0.002;
-  int first_width = 1;  // samples, odd
-  int second_width = 1;
-  int third_width = 1;
-  int correction_width = 1;  // of the outward correction's own average
+  // How long the averages are, at least a knot; the last is the outward correction's own.
+  double first_s = 0.002;
+  double second_s = 0.002;
+  double third_s = 0.002;
+  double correction_s = 0.002;
 
   // Wide enough for the path's jerk limit; with `ramp_s2` above 0 so that T2 T3 is at least that: a jump of jerk then becomes
   // a fifth derivative of at most the jump over ramp_s2.
@@ -30,9 +31,7 @@ struct SmoothingFilter {
                                    double ramp_s2);
 
   double variance_s2() const;
-  int reach() const {
-    return first_width / 2 + second_width / 2 + third_width / 2 + 3;
-  }  // samples either side that a value depends on
+  int reach() const;  // samples either side that a value depends on
   double half_support_s() const { return (reach() + 0.5) * knot_s; }
   // Peak of the answer to a unit step in normal acceleration; above 1 because of the outward correction.
   double overshoot() const;

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "trajectory/core/feed/idle_planner.hpp"
+#include "trajectory/core/feed/level_tops.hpp"
 #include "trajectory/core/feed/reach.hpp"
 #include "trajectory/core/feed/run_profile.hpp"
 
@@ -19,7 +20,7 @@ constexpr std::size_t kAskEvery = 4096;  // segments between questions whether p
 constexpr int kChecksPerSegment = 16;
 constexpr double kAllowed = 1.0 + 5e-7;       // of a limit, on the final polynomials
 constexpr double kStrongestSlowDown = 0.6;    // in one pass
-constexpr double kCure = 0.985;               // slower than would just do, so that few passes are needed
+constexpr double kCure = 0.997;               // slower than would just do, so that few passes are needed
 constexpr int kContourChecks = 8;             // a segment
 constexpr double kToleranceShare = 0.98;      // measured at these, held between them
 constexpr double kPlayedMargin = 1.0 + 1e-5;  // the actuators' quintics make the jet's, nearly
@@ -228,7 +229,7 @@ class StretchPlanner {
     return i + 1 < elements_.size() && (!run || planned_[i].run.end_speed_mm_per_s == 0.0) ? FirstAverage()
                                                                                            : 0.0;
   }
-  double FirstAverage() const { return model_.filter.first_width * knot_; }
+  double FirstAverage() const { return model_.filter.first_s; }
 
   void SolveProfile(PlannedRun& run, double end_speed) {
     run.solved = run.nodes;
@@ -241,6 +242,7 @@ class StretchPlanner {
       }
     }
     SolveSpeedProfile(run.solved, model_.bounds, 0.0, end_speed);
+    LevelTops(run.solved, FirstAverage(), 1.01 * model_.path_acceleration_mm_per_s2);
     for (std::size_t k = 0; k < run.solved.size(); ++k) {  // eased for another reason than the limit itself
       if (run.solved[k].binding == FeedLimit::kPathAcceleration && run.ease[k] < 1.0) {
         run.solved[k].binding = run.slow_reason[k];
@@ -270,6 +272,7 @@ class StretchPlanner {
   void RememberSpeeds(PlannedRun& run, std::size_t i) {
     run.solved = run.nodes;
     SolveSpeedProfile(run.solved, model_.bounds, 0.0, FlowsOn(i) ? 1e9 : 0.0);
+    LevelTops(run.solved, FirstAverage(), 1.01 * model_.path_acceleration_mm_per_s2);
     run_speed_.resize(elements_.size());
     for (const ProfileNode& node : run.solved) {
       run_speed_[i].push_back(std::sqrt(node.x));
@@ -759,7 +762,7 @@ class StretchPlanner {
         // Too much acceleration is cured by less speed at the kink and a little less braking before it.
         const double least =
             worst.reason == FeedLimit::kPathAcceleration ? std::min(kLeastEase, e.run.ease[k]) : 0.0;
-        e.run.ease[k] = std::max(least, e.run.ease[k] * worst.slow * worst.slow);
+        e.run.ease[k] = std::max(least, e.run.ease[k] * worst.slow);
         e.run.slow_reason[k] = worst.reason;
       }
     }
@@ -930,7 +933,8 @@ PlanningModel::PlanningModel(const MachineDescription& m, const PlanOptions& o)
                                         o.compensate ? LeadRamp(m) : 0.0)),
       overshoot(filter.overshoot()),
       kink_deviation_s(filter.kink_deviation_s()),
-      path_acceleration_mm_per_s2(kPathMargin * m.path.acceleration_mm_per_s2) {
+      path_acceleration_mm_per_s2(kPathMargin * m.path.acceleration_mm_per_s2),
+      corner(filter, kink_deviation_s, path_acceleration_mm_per_s2, m.path.jerk_mm_per_s3) {
   for (std::size_t j = 0; j < 2; ++j) {
     bounds.velocity_mm_per_s[j] = kActuatorMargin * m.actuators[j].velocity_mm_per_s;
     bounds.acceleration_mm_per_s2[j] = kActuatorMargin * m.actuators[j].acceleration_mm_per_s2;

@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "trajectory/core/feed/corner_speed.hpp"
 #include "trajectory/core/feed/plan_program.hpp"
 #include "trajectory/core/feed/program_path.hpp"
 #include "trajectory/core/feed/sheet_motion.hpp"
@@ -28,6 +29,7 @@ struct PlanningModel {
   double overshoot = 1.0;         // of the filter, on normal acceleration
   double kink_deviation_s = 0.0;  // of the filter
   double path_acceleration_mm_per_s2 = 0.0;
+  CornerRule corner;
   ActuatorBounds bounds;        // with planning margin
   double elastic_lag_s2 = 0.0;  // 0: not compensated
   double damping_time_s = 0.0;
