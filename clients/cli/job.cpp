@@ -9,6 +9,7 @@
 #include "clients/cli/csv.hpp"
 #include "clients/cli/service_verbs.hpp"
 #include "clients/cli/text_file.hpp"
+#include "clients/cli/trajectory_service.hpp"
 #include "foundation/contract/trouble.hpp"
 #include "lambdajet/cell/v1/cell.grpc.pb.h"
 
@@ -22,6 +23,13 @@ std::string StateName(v1::JobState state) {
   const std::string name = v1::JobState_Name(state);
   constexpr std::string_view kPrefix = "JOB_STATE_";
   return name.substr(name.rfind(kPrefix, 0) == 0 ? kPrefix.size() : 0);
+}
+
+std::string FormatWords(type::v1::ProgramFormat format) {
+  return format == type::v1::PROGRAM_FORMAT_GCODE    ? "  from G-code"
+         : format == type::v1::PROGRAM_FORMAT_CLDATA ? "  from CLDATA"
+         : format == type::v1::PROGRAM_FORMAT_DXF    ? "  from DXF"
+                                                     : "";
 }
 
 Tone ToneOf(v1::JobState state) {
@@ -65,8 +73,9 @@ void PrintJob(const v1::Job& job, Output& output) {
     output.Text(fmt::format("  line {}, column {}: {}: {}", fault.line(), fault.column(), fault.reason(),
                             fault.message()));
   }
-  output.Text(fmt::format("  name {}  request {}  machine {} version {}", job.name(), job.request_id(),
-                          job.model_version().machine_id(), job.model_version().version()));
+  output.Text(fmt::format("  name {}  request {}  machine {} version {}{}", job.name(), job.request_id(),
+                          job.model_version().machine_id(), job.model_version().version(),
+                          FormatWords(job.program_format())));
   const std::string bound = job.predicted_95_mm() > 0.0
                                 ? fmt::format(", predicted 95 % bound {:.3f} mm", job.predicted_95_mm())
                                 : "";
@@ -156,6 +165,7 @@ absl::Status Follow(const Connections& connections, const std::string& job_id, O
 
 struct SubmitOptions {
   std::string file;
+  FormatOptions format;
   std::string request_id;
   std::string name;
   bool compensate = false;
@@ -182,6 +192,10 @@ absl::Status Submit(const SubmitOptions& options, const Connections& connections
                        ? options.file.substr(options.file.find_last_of('/') + 1).substr(0, 128)
                        : options.name);
   request.set_program(*program);
+  request.set_program_format(FormatOf(options.format, options.file));
+  if (options.format.toolpath_given) {
+    *request.mutable_toolpath() = options.format.toolpath;
+  }
   request.set_compensate(options.compensate);
   if (options.feed_scale) {
     request.set_feed_scale(*options.feed_scale);
@@ -335,7 +349,8 @@ absl::Status Report(const std::string& job_id, const std::string& trace, const s
 void AddSubmit(CLI::App& noun, Output& output, const Connections& connections) {
   auto options = std::make_shared<SubmitOptions>();
   CLI::App* verb = noun.add_subcommand("submit", "store a part program as a job and have it admitted");
-  verb->add_option("FILE", options->file, "G-code; - is standard input")->required();
+  verb->add_option("FILE", options->file, "G-code, CLDATA or DXF; - is standard input")->required();
+  AddFormatOptions(*verb, options->format);
   verb->add_option("--request-id", options->request_id,
                    "the same id and content answer the same job; default: a new one");
   verb->add_option("--name", options->name, "for people; default: the file's name");

@@ -256,7 +256,7 @@ absl::Status TellLineStart(const LineVerb& verb, Output& output) {
         OperationsText(start.operations, verb.program + " from line " + std::to_string(verb.line));
     if (!rest) {
       output.Fail(ExitCode::kRefused, "NOT_AS_TEXT",
-                  "an arc outside G17, or a motion timed by G93, is not written out");
+                  "an arc outside G17 is not written out");
       return absl::OkStatus();
     }
     return WriteTextFile(verb.out, *rest);

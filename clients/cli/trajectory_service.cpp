@@ -3,8 +3,10 @@
 
 #include <fmt/format.h>
 
-#include <chrono>
-#include <thread>
+#include <algorithm>
+#include <cctype>
+#include <map>
+#include <numbers>
 
 #include "clients/cli/csv.hpp"
 #include "clients/cli/service_verbs.hpp"
@@ -19,11 +21,11 @@ namespace {
 namespace v1 = trajectory::v1;
 using v1::TrajectoryService;
 
-constexpr auto kPoll = std::chrono::milliseconds(50);
 constexpr double kPlanning_s = 600.0;
 
 struct ProgramOptions {
   std::string file;
+  FormatOptions format;
   bool compensate = false;
   std::optional<double> tolerance_mm;
   std::vector<std::string> tolerance_lines;
@@ -35,7 +37,8 @@ struct ProgramOptions {
 };
 
 void AddProgramOptions(CLI::App& verb, ProgramOptions& options) {
-  verb.add_option("FILE", options.file, "G-code; - is standard input")->required();
+  verb.add_option("FILE", options.file, "G-code, CLDATA or DXF; - is standard input")->required();
+  AddFormatOptions(verb, options.format);
   verb.add_flag("--compensate", options.compensate, "elastic feed-forward");
   verb.add_option("--tolerance-mm", options.tolerance_mm,
                   "feed from tolerance: as fast as the predicted contour error allows");
@@ -71,6 +74,21 @@ v1::PlanOptions ToWire(const ProgramOptions& options) {
   if (options.overlap_mm) wire.set_overlap_mm(*options.overlap_mm);
   if (options.machine_version) wire.set_machine_version(*options.machine_version);
   return wire;
+}
+
+// The file as a request takes it.
+template <typename Request>
+absl::Status Fill(const std::string& file, const FormatOptions& format, Request& request) {
+  const auto program = ReadTextFile(file);
+  if (!program.ok()) {
+    return program.status();
+  }
+  request.set_program(*program);
+  request.set_format(FormatOf(format, file));
+  if (format.toolpath_given) {
+    *request.mutable_toolpath() = format.toolpath;
+  }
+  return absl::OkStatus();
 }
 
 void PrintFaults(const google::protobuf::RepeatedPtrField<v1::ProgramFault>& faults, Output& output) {
@@ -119,16 +137,15 @@ void PrintSummary(const v1::PlanSummary& plan, Output& output) {
 }
 
 absl::Status Check(const ProgramOptions& options, const Connections& connections, Output& output) {
-  const auto program = ReadTextFile(options.file);
-  if (!program.ok()) {
-    return program.status();
-  }
   v1::AdmitProgramRequest request;
-  request.set_program(*program);
+  absl::Status status = Fill(options.file, options.format, request);
+  if (!status.ok()) {
+    return status;
+  }
   *request.mutable_options() = ToWire(options);
   v1::AdmitProgramResponse response;
-  const absl::Status status = connections.Ask<TrajectoryService>(
-      "trajectory", &TrajectoryService::Stub::AdmitProgram, request, response);
+  status = connections.Ask<TrajectoryService>("trajectory", &TrajectoryService::Stub::AdmitProgram, request,
+                                              response);
   if (!status.ok()) {
     return status;
   }
@@ -146,13 +163,12 @@ absl::Status Check(const ProgramOptions& options, const Connections& connections
 }
 
 absl::Status CheckInSteps(const ProgramOptions& options, const Connections& connections, Output& output) {
-  const auto program = ReadTextFile(options.file);
-  const auto channel = connections.Open("trajectory");
-  if (!program.ok() || !channel.ok()) {
-    return program.ok() ? channel.status() : program.status();
-  }
   v1::AdmitProgramRequest request;
-  request.set_program(*program);
+  const absl::Status filled = Fill(options.file, options.format, request);
+  const auto channel = connections.Open("trajectory");
+  if (!filled.ok() || !channel.ok()) {
+    return filled.ok() ? channel.status() : filled;
+  }
   *request.mutable_options() = ToWire(options);
   TrajectoryService::Stub stub(*channel);
   grpc::ClientContext context;
@@ -237,30 +253,39 @@ absl::Status Show(const v1::GetPlanResponse& plan, Output& output) {
   return absl::OkStatus();
 }
 
-absl::Status Plan(const ProgramOptions& options, const Connections& connections, Output& output) {
-  const auto program = ReadTextFile(options.file);
-  if (!program.ok()) {
-    return program.status();
+// Follows a plan to its end with a bar, and shows what became of it.
+absl::Status Watch(std::uint64_t plan_id, const Connections& connections, Output& output) {
+  const auto channel = connections.Open("trajectory");
+  if (!channel.ok()) {
+    return channel.status();
   }
+  TrajectoryService::Stub stub(*channel);
+  grpc::ClientContext context;
+  SetDeadline(context, kPlanning_s);
+  v1::WatchPlanRequest request;
+  request.set_plan_id(plan_id);
+  const auto stream = stub.WatchPlan(&context, request);
+  v1::GetPlanResponse plan;
+  while (stream->Read(&plan)) {
+    if (plan.operation().state() == type::v1::OPERATION_STATE_RUNNING) {
+      output.Progress(plan.operation().progress(), plan.operation().phase());
+    }
+  }
+  output.EndProgress();
+  const absl::Status status = connections.Named("trajectory", FromWire(stream->Finish()));
+  return status.ok() ? Show(plan, output) : status;
+}
+
+absl::Status Plan(const ProgramOptions& options, const Connections& connections, Output& output) {
   v1::PlanProgramRequest request;
-  request.set_program(*program);
+  absl::Status status = Fill(options.file, options.format, request);
   *request.mutable_options() = ToWire(options);
   v1::PlanProgramResponse asked;
-  absl::Status status =
-      connections.Ask<TrajectoryService>("trajectory", &TrajectoryService::Stub::PlanProgram, request, asked);
-  v1::GetPlanRequest get;
-  get.set_plan_id(asked.plan_id());
-  while (status.ok()) {
-    v1::GetPlanResponse plan;
-    status = connections.Ask<TrajectoryService>("trajectory", &TrajectoryService::Stub::GetPlan, get, plan);
-    if (status.ok() && plan.operation().state() != type::v1::OPERATION_STATE_RUNNING) {
-      output.EndProgress();
-      return Show(plan, output);
-    }
-    output.Progress(plan.operation().progress(), plan.operation().phase());
-    std::this_thread::sleep_for(kPoll);
+  if (status.ok()) {
+    status = connections.Ask<TrajectoryService>("trajectory", &TrajectoryService::Stub::PlanProgram, request,
+                                                asked);
   }
-  return status;
+  return status.ok() ? Watch(asked.plan_id(), connections, output) : status;
 }
 
 absl::Status Samples(std::uint64_t plan_id, std::optional<double> step_s, const std::string& out,
@@ -306,31 +331,59 @@ void AddAdmitVerb(CLI::App& noun, Output& output, const Connections& connections
   });
 }
 
-void AddExportVerb(CLI::App& noun, Output& output, const Connections& connections) {
-  auto file = std::make_shared<std::string>();
-  auto plan_id = std::make_shared<std::uint64_t>(0);
-  auto step = std::make_shared<std::optional<double>>();
-  auto to = std::make_shared<std::string>("-");
-  CLI::App* exported =
-      AddServiceVerb(noun, "export", "a program's canonical list, or a plan's points as CSV");
-  exported->add_option("--program", *file, "G-code, for its canonical list");
-  exported->add_option("--plan", *plan_id, "a plan, for its points")->excludes("--program");
-  exported->add_option("--step-s", *step, "distance of points in program time; default 0.004");
-  exported->add_option("--out", *to, "file; - is standard output");
-  exported->callback([file, plan_id, step, to, &output, &connections] {
-    v1::ExportRequest request;
-    request.set_plan_id(*plan_id);
-    if (*step) request.set_step_s(**step);
-    request.set_format(*plan_id != 0 ? v1::ExportRequest::FORMAT_SAMPLES_CSV
-                                     : v1::ExportRequest::FORMAT_CANONICAL);
-    if (*plan_id == 0) {
-      const auto program = ReadTextFile(*file);
-      if (!program.ok()) {
-        return output.Fail(program.status());
-      }
-      request.set_program(*program);
+struct ExportOptions {
+  std::string file;
+  FormatOptions format;
+  std::uint64_t plan_id = 0;
+  std::optional<double> step_s;
+  std::string as;
+  std::string out = "-";
+};
+
+absl::Status RunExport(const ExportOptions& options, const Connections& connections) {
+  v1::ExportRequest request;
+  request.set_plan_id(options.plan_id);
+  if (options.step_s) request.set_step_s(*options.step_s);
+  request.set_format(options.as == "gcode"       ? v1::ExportRequest::FORMAT_GCODE
+                     : options.as == "cldata"    ? v1::ExportRequest::FORMAT_CLDATA
+                     : options.as == "canonical" ? v1::ExportRequest::FORMAT_CANONICAL
+                     : options.as == "samples"   ? v1::ExportRequest::FORMAT_SAMPLES_CSV
+                     : options.plan_id != 0      ? v1::ExportRequest::FORMAT_SAMPLES_CSV
+                                                 : v1::ExportRequest::FORMAT_CANONICAL);
+  if (options.plan_id == 0) {
+    v1::ListOperationsRequest program;
+    if (const absl::Status status = Fill(options.file, options.format, program); !status.ok()) {
+      return status;
     }
-    output.Finish(Export(request, *to, connections));
+    request.set_program(program.program());
+    request.set_program_format(program.format());
+    if (program.has_toolpath()) {
+      *request.mutable_toolpath() = program.toolpath();
+    }
+  }
+  return Export(request, options.out, connections);
+}
+
+void AddExportVerb(CLI::App& noun, Output& output, const Connections& connections) {
+  auto options = std::make_shared<ExportOptions>();
+  CLI::App* exported = AddServiceVerb(
+      noun, "export", "a program or a plan as G-code, CLDATA or canonical list, or a plan's points as CSV");
+  auto* file = exported->add_option("--program", options->file, "G-code, CLDATA or DXF");
+  exported->add_option("--plan", options->plan_id, "a plan in the place of a program")->excludes(file);
+  exported->add_option("--as", options->as, "default: canonical of a program, samples of a plan")
+      ->check(CLI::IsMember({"gcode", "cldata", "canonical", "samples"}));
+  exported->add_option("--step-s", options->step_s, "distance of points in program time; default 0.004");
+  exported->add_option("--out", options->out, "file; - is standard output");
+  AddFormatOptions(*exported, options->format);
+  exported->callback([options, &output, &connections] { output.Finish(RunExport(*options, connections)); });
+}
+
+void AddWatchVerb(CLI::App& noun, Output& output, const Connections& connections) {
+  auto plan_id = std::make_shared<std::uint64_t>(0);
+  CLI::App* watch = AddServiceVerb(noun, "watch", "follow a plan to its end; then as show");
+  watch->add_option("PLAN", *plan_id, "the plan's id")->required();
+  watch->callback([plan_id, &output, &connections] {
+    if (const absl::Status status = Watch(*plan_id, connections, output); !status.ok()) output.Fail(status);
   });
 }
 
@@ -341,7 +394,100 @@ void AddListVerb(CLI::App& noun, Output& output, const Connections& connections)
   });
 }
 
+// An option that sets a field of the settings.
+template <typename Value, typename Set>
+CLI::Option* AddSetting(CLI::App& verb, FormatOptions& options, const char* name, const char* what, Set set) {
+  return verb
+      .add_option_function<Value>(
+          name,
+          [&options, set](const Value& value) {
+            options.toolpath_given = true;
+            set(options.toolpath, value);
+          },
+          what)
+      ->group("Drawings");
+}
+
 }  // namespace
+
+void AddFormatOptions(CLI::App& verb, FormatOptions& options) {
+  using Settings = type::v1::ToolpathSettings;
+  using Names = std::vector<std::string>;
+  constexpr double kDegree_rad = std::numbers::pi / 180.0;
+  verb.add_option("--format", options.format, "file: as the name of the file ends, or as it begins")
+      ->check(CLI::IsMember({"file", "gcode", "cldata", "dxf"}))
+      ->capture_default_str();
+  const auto number = [&](const char* name, const char* what, auto set) {
+    AddSetting<double>(verb, options, name, what, set);
+  };
+  number("--kerf-mm", "width of the cut; default: the machine's",
+         [](Settings& s, double v) { s.set_kerf_mm(v); });
+  number("--cut-feed-mm-per-s", "of the cut; default 60",
+         [](Settings& s, double v) { s.set_feed_mm_per_s(v); });
+  number("--lead-mm", "length of a line, radius of an arc; default 4",
+         [](Settings& s, double v) { s.set_lead_mm(v); });
+  number("--lead-angle-deg", "of a line to the path; default 45",
+         [](Settings& s, double v) { s.set_lead_angle_rad(v * kDegree_rad); });
+  number("--lead-overlap-mm", "cut again where the path closes; default 1",
+         [](Settings& s, double v) { s.set_overlap_mm(v); });
+  number("--pierce-time-s", "0: the machine's own", [](Settings& s, double v) { s.set_pierce_time_s(v); });
+  number("--tab-mm", "what a tab leaves standing", [](Settings& s, double v) { s.set_tab_mm(v); });
+  number("--tabs", "on each outline",
+         [](Settings& s, double v) { s.set_tab_count(static_cast<std::uint32_t>(std::max(0.0, v))); });
+  number("--turn-deg", "turns the drawing counter-clockwise",
+         [](Settings& s, double v) { s.set_turn_rad(v * kDegree_rad); });
+  AddSetting<std::string>(verb, options, "--lead", "none, line or arc; default arc",
+                          [](Settings& s, const std::string& v) {
+                            s.set_lead(v == "none"   ? Settings::LEAD_NONE
+                                       : v == "line" ? Settings::LEAD_LINE
+                                                     : Settings::LEAD_ARC);
+                          })
+      ->check(CLI::IsMember({"none", "line", "arc"}));
+  AddSetting<std::string>(verb, options, "--pierce", "stationary, moving or pre-pierced",
+                          [](Settings& s, const std::string& v) {
+                            s.set_pierce(v == "moving"        ? Settings::PIERCE_MOVING
+                                         : v == "pre-pierced" ? Settings::PIERCE_PRE_PIERCED
+                                                              : Settings::PIERCE_STATIONARY);
+                          })
+      ->check(CLI::IsMember({"stationary", "moving", "pre-pierced"}));
+  AddSetting<std::vector<double>>(verb, options, "--at", "X Y in W of the drawing's lower left corner, mm",
+                                  [](Settings& s, const std::vector<double>& v) {
+                                    s.set_corner_x_w_mm(v[0]);
+                                    s.set_corner_y_w_mm(v[1]);
+                                  })
+      ->expected(2);
+  AddSetting<Names>(
+      verb, options, "--ignore", "layer to leave out, may be given again",
+      [](Settings& s, const Names& v) { s.mutable_ignore_layers()->Assign(v.begin(), v.end()); });
+  AddSetting<Names>(verb, options, "--cut", "layer to cut, may be given again; none: all others",
+                    [](Settings& s, const Names& v) { s.mutable_cut_layers()->Assign(v.begin(), v.end()); });
+  AddSetting<Names>(verb, options, "--mark", "layer to scribe along its lines, may be given again",
+                    [](Settings& s, const Names& v) { s.mutable_mark_layers()->Assign(v.begin(), v.end()); });
+  verb.add_flag_function(
+          "--drawing-order",
+          [&options](std::int64_t) {
+            options.toolpath_given = true;
+            options.toolpath.set_keep_drawing_order(true);
+          },
+          "keep the drawing's order as far as inner before outer allows")
+      ->group("Drawings");
+}
+
+type::v1::ProgramFormat FormatOf(const FormatOptions& options, const std::string& file) {
+  static const std::map<std::string_view, type::v1::ProgramFormat> kFormats = {
+      {"gcode", type::v1::PROGRAM_FORMAT_GCODE}, {"cldata", type::v1::PROGRAM_FORMAT_CLDATA},
+      {"dxf", type::v1::PROGRAM_FORMAT_DXF},     {"ngc", type::v1::PROGRAM_FORMAT_GCODE},
+      {"nc", type::v1::PROGRAM_FORMAT_GCODE},    {"apt", type::v1::PROGRAM_FORMAT_CLDATA},
+      {"cls", type::v1::PROGRAM_FORMAT_CLDATA}};
+  std::string word = options.format;
+  if (word == "file") {
+    const std::size_t dot = file.find_last_of('.');
+    word = dot == std::string::npos ? "" : file.substr(dot + 1);
+    std::transform(word.begin(), word.end(), word.begin(), [](unsigned char c) { return std::tolower(c); });
+  }
+  const auto found = kFormats.find(word);
+  return found == kFormats.end() ? type::v1::PROGRAM_FORMAT_UNSPECIFIED : found->second;
+}
 
 absl::Status ReadPlanPoints(const Connections& connections, std::uint64_t plan_id,
                             std::optional<double> step_s, PlanPoints& points) {
@@ -386,6 +532,7 @@ void AddTrajectoryServiceVerbs(CLI::App& noun, Output& output, const Connections
   AddAdmitVerb(noun, output, connections);
   AddExportVerb(noun, output, connections);
   AddListVerb(noun, output, connections);
+  AddWatchVerb(noun, output, connections);
 
   auto planned = std::make_shared<ProgramOptions>();
   CLI::App* plan = AddServiceVerb(noun, "plan", "have trajectory plan a program; time, feed, what limits it");

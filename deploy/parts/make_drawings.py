@@ -5,6 +5,7 @@ slotted_plate.dxf   a plate of loose lines and arcs, slots as polylines with bul
                     insertion, centre lines on a layer of their own, a scribed line
 mixed_nest.dxf      an ellipse with a bore, a spline cam, a bracket inserted twice (turned, mirrored and scaled), a ring with
                     a small part in its window
+cover/cover.dxf     a small plate with a bore, the same as cover.ngc and cover.cldata beside it
 
     make_drawings.py [FOLDER]      writes into FOLDER (default: beside this file)
 """
@@ -128,10 +129,19 @@ def mixed_nest():
     return drawing(entities, [("BRACKET", bracket)])
 
 
+def cover():
+    bulge = math.tan(math.radians(90.0) / 4.0)  # a quarter turn, counter-clockwise
+    outline = polyline("CUT", [(376, 280, 0), (424, 280, bulge), (430, 286, 0), (430, 314, bulge), (424, 320, 0), (376, 320, bulge),
+                               (370, 314, 0), (370, 286, bulge)])
+    return drawing([outline, line("CENTRE", (385, 300), (415, 300)), line("CENTRE", (400, 285), (400, 315)), circle("CUT", 400, 300, 10)])
+
+
 def main():
     folder = pathlib.Path(sys.argv[1] if len(sys.argv) > 1 else pathlib.Path(__file__).parent)
     (folder / "slotted_plate.dxf").write_text(slotted_plate())
     (folder / "mixed_nest.dxf").write_text(mixed_nest())
+    (folder / "cover").mkdir(exist_ok=True)
+    (folder / "cover" / "cover.dxf").write_text(cover())
 
 
 if __name__ == "__main__":

@@ -33,10 +33,11 @@ def private_domain():
 
 
 @contextlib.contextmanager
-def cell_under_test(build, plant=SOURCE / "deploy" / "plants" / "shipped.yaml", seed=1, flags=()):
+def cell_under_test(build, plant=SOURCE / "deploy" / "plants" / "shipped.yaml", seed=1, flags=(),
+                    machine=SOURCE / "deploy" / "config" / "machine.yaml"):
     """Yields (processes, cell), serving; stops them at the end and keeps the logs' last words for a failure."""
     with private_domain() as domain, tempfile.TemporaryDirectory(prefix="lambdajet-cell-") as folder:
-        options = types.SimpleNamespace(machine=SOURCE / "deploy" / "config" / "machine.yaml", plant=plant, seed=seed)
+        options = types.SimpleNamespace(machine=machine, plant=plant, seed=seed)
         processes = cell_processes.LocalProcesses(
             SOURCE,
             pathlib.Path(build),

@@ -3,45 +3,15 @@ value (or one a line) on standard output, nothing there when the verb fails. One
 
 import json
 import pathlib
-import subprocess
 import sys
 import unittest
 
 import cell_under_test as under_test
 import stages
+from lambdajet_shell import DONE, REFUSED, UNREACHABLE, WRONG_STATE, Lambdajet
 
 BUILD = pathlib.Path(sys.argv.pop(1))
 DRAWING = under_test.SOURCE / "deploy" / "parts" / "bracket.drawing.yaml"
-DONE, REFUSED, UNREACHABLE, WRONG_STATE = 0, 4, 3, 6
-
-
-class Lambdajet:
-    def __init__(self, test, announce_folder):
-        self.test = test
-        self.flags = ["--announce-dir", str(announce_folder)]
-
-    def run(self, *words, code=DONE):
-        """Standard output; fails the test unless the exit code is one of those expected."""
-        done = subprocess.run([str(BUILD / "bin" / "lambdajet"), *self.flags, *map(str, words)], stdin=subprocess.DEVNULL,
-                              stdout=subprocess.PIPE, stderr=subprocess.PIPE, timeout=60, check=False)
-        said, trouble = done.stdout.decode(), done.stderr.decode()
-        expected = code if isinstance(code, tuple) else (code,)
-        self.test.assertIn(done.returncode, expected, f"{words}: {said}{trouble}")
-        if done.returncode in (REFUSED, UNREACHABLE):
-            self.test.assertEqual(said, "", f"{words} failed and still answered")
-            self.test.assertNotEqual(trouble, "", f"{words} failed in silence")
-        return said if done.returncode not in (REFUSED, UNREACHABLE) else trouble
-
-    def ask(self, *words, code=DONE):
-        """What the verb says with --json, after it has said the same in words: (words, value)."""
-        people = self.run(*words, code=code)
-        self.test.assertNotEqual(people.strip(), "", f"{words} has nothing to say to people")
-        return people, self.ask_json(*words, code=code)
-
-    def ask_json(self, *words, code=DONE):
-        lines = self.run("--json", *words, code=code).strip().splitlines()
-        self.test.assertTrue(lines, f"{words} has nothing to say with --json")
-        return [json.loads(line) for line in lines][-1]
 
 
 class EveryVerb(unittest.TestCase):
@@ -50,7 +20,7 @@ class EveryVerb(unittest.TestCase):
         cls.processes, cell = cls.enterClassContext(under_test.cell_under_test(BUILD))
         stages.wait_until_heard(cell)
         cls.folder = cls.processes.folder
-        shell = Lambdajet(cls("test_accuracy"), cls.folder)
+        shell = Lambdajet(cls("test_accuracy"), BUILD, cls.folder)
         shell.run("machine", "state", code=WRONG_STATE)  # nothing is referenced yet
         shell.run("machine", "reset")
         cls.program = cls.folder / "verify.ngc"
@@ -69,7 +39,7 @@ class EveryVerb(unittest.TestCase):
             cls.watched += shell.run("job", "watch", cls.job, code=(DONE, WRONG_STATE))
 
     def setUp(self):
-        self.lambdajet = Lambdajet(self, self.folder)
+        self.lambdajet = Lambdajet(self, BUILD, self.folder)
 
     def test_job(self):
         ask, run, job = self.lambdajet.ask, self.lambdajet.run, self.job
@@ -202,7 +172,7 @@ class EveryVerb(unittest.TestCase):
         run("inspection", "path", 4711, code=REFUSED)
 
     def test_a_service_that_is_not_there_is_named(self):
-        said = Lambdajet(self, self.folder).run("--address", "cell=127.0.0.1:1", "--timeout", 5, "job", "list", code=UNREACHABLE)
+        said = Lambdajet(self, BUILD, self.folder).run("--address", "cell=127.0.0.1:1", "--timeout", 5, "job", "list", code=UNREACHABLE)
         self.assertRegex(said, "cell at 127.0.0.1:1 does not answer")
 
 

@@ -44,6 +44,9 @@ struct ModelVersion {
   friend bool operator==(const ModelVersion&, const ModelVersion&) = default;
 };
 
+// As on the wire: what a program is written in.
+enum class ProgramFormat : std::uint32_t { kByContent = 0, kGcode, kCldata, kDxf };
+
 // What a client asked.
 struct JobOrder {
   std::string job_id;
@@ -56,6 +59,8 @@ struct JobOrder {
   bool pins_version = false;  // only with this machine version:
   std::uint32_t machine_version = 0;
   std::int64_t submitted_ns = 0;
+  ProgramFormat program_format = ProgramFormat::kByContent;
+  std::string toolpath;  // of a drawing: the request's settings, as the wire writes them
 };
 
 // What became of it.

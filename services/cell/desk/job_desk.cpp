@@ -277,7 +277,9 @@ absl::StatusOr<LiveJob> JobDesk::Submit(const Submission& submission, double pat
                submission.feed_scale,
                submission.machine_version.has_value(),
                submission.machine_version.value_or(0),
-               clock_.now_ns()};
+               clock_.now_ns(),
+               submission.program_format,
+               submission.toolpath};
   const auto record = journal_->Add(job, submission.program, clock_.now_ns());
   if (!record.ok()) {
     return record.status();

@@ -38,6 +38,8 @@ struct Submission {
   bool compensate = false;
   double feed_scale = 1.0;
   std::optional<std::uint32_t> machine_version;
+  ProgramFormat program_format = ProgramFormat::kByContent;
+  std::string toolpath;  // as in JobOrder
 };
 
 // A job with what is known of it at this moment.

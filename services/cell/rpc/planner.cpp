@@ -55,6 +55,16 @@ trajectory::v1::PlanOptions OptionsOf(const JobOrder& order, const std::optional
   return options;
 }
 
+// Program, format and a drawing's settings, into a request that carries them.
+template <typename Request>
+void FillProgram(const JobOrder& order, const std::string& program, Request& request) {
+  request.set_program(program);
+  request.set_format(static_cast<type::v1::ProgramFormat>(order.program_format));
+  if (order.program_format == ProgramFormat::kDxf) {
+    (void)request.mutable_toolpath()->ParseFromString(order.toolpath);
+  }
+}
+
 bool IsPassing(const absl::Status& status) {
   return status.code() == absl::StatusCode::kUnavailable ||
          status.code() == absl::StatusCode::kDeadlineExceeded ||
@@ -87,7 +97,7 @@ class Planner::Trajectory {
 
   absl::Status Admit(const AdmissionTask& task, trajectory::v1::AdmitProgramResponse& response) {
     trajectory::v1::AdmitProgramRequest request;
-    request.set_program(task.program);
+    FillProgram(task.order, task.program, request);
     *request.mutable_options() = OptionsOf(task.order, std::nullopt);
     return Call(&TrajectoryService::Stub::AdmitProgram, stub_, request, response, kAdmit_s);
   }
@@ -95,7 +105,7 @@ class Planner::Trajectory {
   Planned Plan(const JobOrder& order, const std::string& program, const std::optional<ResumeFrom>& from,
                const std::atomic<bool>& stop) {
     trajectory::v1::PlanProgramRequest request;
-    request.set_program(program);
+    FillProgram(order, program, request);
     *request.mutable_options() = OptionsOf(order, from);
     trajectory::v1::PlanProgramResponse asked;
     if (absl::Status status = Call(&TrajectoryService::Stub::PlanProgram, stub_, request, asked, kAdmit_s);

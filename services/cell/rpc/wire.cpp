@@ -15,6 +15,7 @@ namespace {
 constexpr std::size_t kLongestId = 128;
 constexpr std::size_t kLongestName_bytes = 128;
 constexpr double kLargestFeedScale = 1.2;
+constexpr std::size_t kLargestToolpath_bytes = 64u << 10;
 
 bool IsWord(std::string_view text) {
   return !text.empty() && text.size() <= kLongestId && std::all_of(text.begin(), text.end(), [](char c) {
@@ -78,6 +79,33 @@ std::optional<JobState> FromWire(v1::JobState state) {
   return static_cast<JobState>(state);
 }
 
+namespace {
+
+// The settings themselves are trajectory's to judge; here they must only have a drawing, and be small enough to keep.
+void CheckFormat(const v1::SubmitJobRequest& request, ArgumentChecks& checks) {
+  checks.Require(type::v1::ProgramFormat_IsValid(request.program_format()), "program_format",
+                 "UNKNOWN_FORMAT",
+                 fmt::format("{} is none of the formats", static_cast<int>(request.program_format())));
+  checks.Require(!request.has_toolpath() || request.program_format() == type::v1::PROGRAM_FORMAT_DXF,
+                 "toolpath", "TOOLPATH_NOT_WANTED",
+                 "settings of a toolpath are for drawings, PROGRAM_FORMAT_DXF");
+  checks.Require(request.toolpath().ByteSizeLong() <= kLargestToolpath_bytes, "toolpath", "TOO_LARGE",
+                 fmt::format("{} bytes; at most {} are kept", request.toolpath().ByteSizeLong(),
+                             kLargestToolpath_bytes));
+}
+
+// One text for what one client may say twice; the same settings give the same bytes.
+std::string ContentOf(const Submission& s) {
+  std::string content = fmt::format("{} {} {} {}", s.program_sha256, s.compensate, s.feed_scale,
+                                    s.machine_version ? static_cast<std::int64_t>(*s.machine_version) : -1);
+  if (s.program_format != ProgramFormat::kByContent) {
+    content += fmt::format(" {} {}", static_cast<std::uint32_t>(s.program_format), s.toolpath);
+  }
+  return content;
+}
+
+}  // namespace
+
 absl::StatusOr<Submission> FromWire(const v1::SubmitJobRequest& request) {
   ArgumentChecks checks;
   checks.Require(IsWord(request.request_id()), "request_id", "BAD_ID",
@@ -88,9 +116,11 @@ absl::StatusOr<Submission> FromWire(const v1::SubmitJobRequest& request) {
   checks.Require(request.program().size() <= kLargestProgram_bytes, "program", "PROGRAM_TOO_LARGE",
                  fmt::format("the program has {} bytes; at most {} are taken", request.program().size(),
                              kLargestProgram_bytes));
-  if (checks.ok()) {
+  const bool drawing = request.program_format() == type::v1::PROGRAM_FORMAT_DXF;
+  if (checks.ok() && !drawing) {
     checks.Text("program", request.program(), kLargestProgram_bytes);
   }
+  CheckFormat(request, checks);
   if (request.has_feed_scale()) {
     checks.Positive("feed_scale", request.feed_scale());
     checks.InRange("feed_scale", request.feed_scale(), 0.0, kLargestFeedScale);
@@ -105,13 +135,15 @@ absl::StatusOr<Submission> FromWire(const v1::SubmitJobRequest& request) {
                         "",
                         request.compensate(),
                         request.has_feed_scale() ? request.feed_scale() : 1.0,
-                        std::nullopt};
+                        std::nullopt,
+                        ProgramFormat::kByContent,
+                        ""};
   if (request.has_machine_version()) {
     submission.machine_version = request.machine_version();
   }
-  submission.content_sha256 = Sha256(
-      fmt::format("{} {} {} {}", submission.program_sha256, submission.compensate, submission.feed_scale,
-                  submission.machine_version ? static_cast<std::int64_t>(*submission.machine_version) : -1));
+  submission.program_format = static_cast<ProgramFormat>(request.program_format());
+  submission.toolpath = request.toolpath().SerializeAsString();
+  submission.content_sha256 = Sha256(ContentOf(submission));
   return submission;
 }
 
@@ -146,6 +178,7 @@ v1::Job ToWire(const LiveJob& live) {
   wire.set_started(TimeText(progress.started_ns));
   wire.set_ended(TimeText(progress.ended_ns));
   wire.set_feed_mm_per_s(live.feed_mm_per_s);
+  wire.set_program_format(static_cast<type::v1::ProgramFormat>(order.program_format));
   return wire;
 }
 

@@ -55,10 +55,16 @@ CREATE TABLE run_parts (
 CREATE INDEX run_parts_by_job ON run_parts (job, number);
 )sql";
 
+// What a program is written in, and how a drawing is cut.
+constexpr char kFormatSchema[] = R"sql(
+ALTER TABLE jobs ADD COLUMN program_format INTEGER NOT NULL DEFAULT 0;
+ALTER TABLE jobs ADD COLUMN toolpath BLOB NOT NULL DEFAULT x'';
+)sql";
+
 constexpr char kJobColumns[] =
     "jobs.number, job_id, request_id, name, program_sha256, content_sha256, compensate, feed_scale, "
     "pins_version, "
-    "machine_version, submitted_ns";
+    "machine_version, submitted_ns, program_format, toolpath";
 
 // --- One text line for what changes: fields of a job apart by the unit separator, lists by the record separator --------
 
@@ -169,7 +175,7 @@ void AppendItems(std::string_view bytes, std::vector<Item>& items) {
   std::memcpy(items.data() + before, bytes.data(), (items.size() - before) * sizeof(Item));
 }
 
-constexpr int kJobColumnCount = 11;
+constexpr int kJobColumnCount = 13;
 
 // Columns from 0 on: kJobColumns, state, changing, s_mm.
 Job ReadJob(const Row& row) {
@@ -184,6 +190,8 @@ Job ReadJob(const Row& row) {
   job.order.pins_version = row.integer(8) != 0;
   job.order.machine_version = static_cast<std::uint32_t>(row.integer(9));
   job.order.submitted_ns = row.integer(10);
+  job.order.program_format = static_cast<ProgramFormat>(row.integer(11));
+  job.order.toolpath = row.text(12);
   job.progress = FromText(row.text(kJobColumnCount + 1), static_cast<int>(row.integer(kJobColumnCount)),
                           row.number(kJobColumnCount + 2));
   return job;
@@ -237,7 +245,7 @@ Journal::Journal(std::unique_ptr<Database> database) : database_(std::move(datab
 Journal::~Journal() = default;
 
 absl::StatusOr<std::unique_ptr<Journal>> Journal::Open(const std::string& path) {
-  auto database = Database::Open(path, {kSchema});
+  auto database = Database::Open(path, {kSchema, kFormatSchema});
   if (!database.ok()) {
     return database.status();
   }
@@ -256,12 +264,13 @@ absl::StatusOr<JournalRecord> Journal::Add(const Job& job, std::string_view prog
     const auto inserted = database_->Run(
         "INSERT INTO jobs (job_id, request_id, name, program, program_sha256, content_sha256, compensate, "
         "feed_scale, "
-        "pins_version, machine_version, submitted_ns, state, changing, s_mm) VALUES "
-        "(?,?,?,?,?,?,?,?,?,?,?,?,?,?)",
+        "pins_version, machine_version, submitted_ns, state, changing, s_mm, program_format, toolpath) "
+        "VALUES "
+        "(?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)",
         {record.job.order.job_id, order.request_id, order.name, SqlBlob{std::string(program)},
          order.program_sha256, order.content_sha256, order.compensate, order.feed_scale, order.pins_version,
          order.machine_version, order.submitted_ns, Number(job.progress.state), ToText(job.progress),
-         job.progress.s_mm});
+         job.progress.s_mm, static_cast<std::int64_t>(order.program_format), SqlBlob{order.toolpath}});
     return inserted.ok() ? InsertRecord(*database_, record.job, now_ns, record.token) : inserted.status();
   });
   if (!status.ok()) {

@@ -45,7 +45,8 @@ absl::Status AdmissionInSteps::Read(const Tell& tell, bool& refused) {
   if (!tell(MakeStep("PARSE", Step::STATE_RUNNING, 0.0))) {
     return NobodyListens();
   }
-  const Admission admission = AdmitPartProgram(program_, *machine_, options_);
+  program_ = MakeProgram(std::move(submitted_), machine_.get());
+  const Admission admission = AdmitMade(program_, *machine_, options_);
   const bool laid_out = admission.cutting_length_mm + admission.idle_length_mm > 0.0;
   for (std::size_t s = 0; s < kReadingSteps.size(); ++s) {
     Step step = MakeStep(kReadingSteps[s], Step::STATE_PASSED, 1.0);

@@ -19,10 +19,10 @@ class AdmissionInSteps {
   using Tell = std::function<bool(v1::AdmissionStep)>;  // false: nobody listens
 
   // `desk` and `closing` outlive it.
-  AdmissionInSteps(std::string program, const PlanOptions& options,
+  AdmissionInSteps(SubmittedProgram program, const PlanOptions& options,
                    std::shared_ptr<const MachineDescription> machine, PlanDesk& desk,
                    const std::atomic<bool>& closing)
-      : program_(std::move(program)),
+      : submitted_(std::move(program)),
         options_(options),
         machine_(std::move(machine)),
         desk_(desk),
@@ -35,7 +35,8 @@ class AdmissionInSteps {
   absl::Status Plan(const Tell& tell);
   absl::Status Watch(const PlanRecord& record, const Tell& tell);
 
-  std::string program_;
+  SubmittedProgram submitted_;
+  MadeProgram program_;
   PlanOptions options_;
   std::shared_ptr<const MachineDescription> machine_;
   PlanDesk& desk_;

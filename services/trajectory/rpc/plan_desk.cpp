@@ -31,29 +31,51 @@ PlanDesk::PlanDesk(Metrics& metrics)
                                           {0.01, 0.03, 0.1, 0.3, 1, 3, 10, 30, 100})),
       pool_(kThreads, kMostWaiting) {}
 
+// Called with the mutex held.
+std::shared_ptr<PlanRecord> PlanDesk::NewRecord(std::uint64_t id, PlanOptions options,
+                                                std::shared_ptr<const MachineDescription> machine) {
+  auto record = std::make_shared<PlanRecord>();
+  record->id = id;
+  record->number = ++numbers_;
+  record->machine = std::move(machine);
+  record->options = std::move(options);
+  return record;
+}
+
+// Called with the mutex held.
+void PlanDesk::Replace(std::shared_ptr<PlanRecord> record) {
+  std::erase_if(records_, [&record](const auto& r) { return r->id == record->id; });
+  records_.push_back(std::move(record));
+  GiveUpOldest();
+}
+
 absl::StatusOr<std::shared_ptr<const PlanRecord>> PlanDesk::Begin(
-    std::string program, const PlanOptions& options, std::shared_ptr<const MachineDescription> machine) {
-  const std::uint64_t id = PlanIdOf(program, options, *machine);
+    MadeProgram program, PlanOptions options, std::shared_ptr<const MachineDescription> machine) {
+  options.notation = program.notation;
+  const std::uint64_t id = PlanIdOf(program.text, options, *machine);
   const std::lock_guard lock(mutex_);
+  if (!program.faults.empty()) {
+    const auto refused = NewRecord(id, std::move(options), std::move(machine));
+    auto planned = std::make_shared<PlannedProgram>();
+    planned->faults = std::move(program.faults);
+    refused->planned = std::move(planned);
+    refused->progress = 1.0;
+    refused->state = PlanState::kFailed;
+    Replace(refused);
+    plans_failed_.Increment();
+    return std::shared_ptr<const PlanRecord>(refused);
+  }
   const auto there =
       std::find_if(records_.begin(), records_.end(), [id](const auto& r) { return r->id == id; });
   if (there != records_.end() && (*there)->state != PlanState::kCancelled && !(*there)->cancel) {
     return std::shared_ptr<const PlanRecord>(*there);
   }
-  auto record = std::make_shared<PlanRecord>();
-  record->id = id;
-  record->number = ++numbers_;
-  record->machine = std::move(machine);
-  record->options = options;
-  record->program = std::move(program);
+  const auto record = NewRecord(id, std::move(options), std::move(machine));
+  record->program = std::move(program.text);
   if (const absl::Status queued = pool_.Submit([this, record] { Work(record); }); !queued.ok()) {
     return queued;
   }
-  if (there != records_.end()) {
-    records_.erase(there);
-  }
-  records_.push_back(record);
-  GiveUpOldest();
+  Replace(record);
   return std::shared_ptr<const PlanRecord>(record);
 }
 
@@ -72,8 +94,9 @@ void PlanDesk::Work(const std::shared_ptr<PlanRecord>& record) {
   if (planned->faults.empty() && !record->cancel) {
     record->predicted_95_mm = PredictedBound(*record->machine, *planned, record->cancel);
   }
-  record->program.clear();
-  record->program.shrink_to_fit();
+  if (record->program.size() > kMostKeptBytes) {
+    std::string().swap(record->program);
+  }
   const bool done = planned->faults.empty();
   record->planned = std::move(planned);
   record->progress = 1.0;

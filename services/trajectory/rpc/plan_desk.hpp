@@ -19,6 +19,7 @@
 #include "platform/rpc/work_pool.hpp"
 #include "platform/telemetry/metrics.hpp"
 #include "trajectory/core/tolerance/plan_to_tolerance.hpp"
+#include "trajectory/rpc/submitted_program.hpp"
 
 namespace lambdajet::trajectory {
 
@@ -30,7 +31,7 @@ struct PlanRecord {
   std::uint64_t number = 0;  // counts up; newest is highest
   std::shared_ptr<const MachineDescription> machine;
   PlanOptions options;
-  std::string program;  // given up when planning ends
+  std::string program;  // one of more than kMostKeptBytes is given up when planning ends
   std::atomic<PlanState> state = PlanState::kRunning;
   std::atomic<double> progress = 0.0;
   std::atomic<bool> cancel = false;
@@ -42,10 +43,12 @@ struct PlanRecord {
 class PlanDesk {
  public:
   static constexpr std::size_t kMostPlans = 12;
+  static constexpr std::size_t kMostKeptBytes = 2u << 20;  // so that a plan can be written out as a program
 
   explicit PlanDesk(Metrics& metrics);
 
-  absl::StatusOr<std::shared_ptr<const PlanRecord>> Begin(std::string program, const PlanOptions& options,
+  // A program with faults is a plan that has failed.
+  absl::StatusOr<std::shared_ptr<const PlanRecord>> Begin(MadeProgram program, PlanOptions options,
                                                           std::shared_ptr<const MachineDescription> machine);
   std::shared_ptr<const PlanRecord> Find(std::uint64_t id) const;  // null: not known
   std::shared_ptr<const PlanRecord> Cancel(std::uint64_t id);
@@ -56,6 +59,9 @@ class PlanDesk {
   void CancelAll();
 
  private:
+  std::shared_ptr<PlanRecord> NewRecord(std::uint64_t id, PlanOptions options,
+                                        std::shared_ptr<const MachineDescription> machine);
+  void Replace(std::shared_ptr<PlanRecord> record);
   void Work(const std::shared_ptr<PlanRecord>& record);
   void GiveUpOldest();
 

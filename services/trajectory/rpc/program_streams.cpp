@@ -6,7 +6,8 @@
 
 #include "foundation/contract/trouble.hpp"
 #include "trajectory/core/feed/plan_samples.hpp"
-#include "trajectory/core/part_program/read_program.hpp"
+#include "trajectory/core/part_program/cldata_writer.hpp"
+#include "trajectory/core/toolpath/program_text.hpp"
 
 namespace lambdajet::trajectory {
 namespace {
@@ -19,20 +20,24 @@ constexpr const char* kSampleHeader =
 
 // A program on its way out, read when it is first asked for.
 struct Listing {
-  std::string text;
+  ListedProgram listed;
   bool read = false;
   PartProgram program;
   std::size_t next = 0;
 
-  explicit Listing(std::string of) : text(std::move(of)) {}
+  explicit Listing(ListedProgram of) : listed(std::move(of)) {}
   void Read() {
     if (!read) {
-      program = ReadPartProgram(text);
-      std::string().swap(text);
+      program = ReadListed(std::move(listed));
       read = true;
     }
   }
 };
+
+absl::Status FaultStatus(const ProgramFault& fault) {
+  return Trouble(absl::StatusCode::kFailedPrecondition, std::string(fault.reason),
+                 "line " + std::to_string(fault.line) + ": " + fault.message);
+}
 
 void AppendSample(const FullSample& s, std::string& csv) {
   const std::array<double, 12> numbers = {
@@ -50,7 +55,23 @@ void AppendSample(const FullSample& s, std::string& csv) {
 
 }  // namespace
 
-Source<v1::OperationBatch> OperationBatches(std::string program) {
+PartProgram ReadListed(ListedProgram listed) {
+  MadeProgram made = MakeProgram(std::move(listed.program), listed.machine.get());
+  if (!made.faults.empty()) {
+    PartProgram refused;
+    refused.faults = std::move(made.faults);
+    return refused;
+  }
+  ReadOptions options;
+  options.notation = made.notation;
+  if (listed.machine != nullptr) {
+    options.gcode.kerf_width_mm = listed.machine->process.kerf_width_mm;
+    options.gcode.default_tolerance_mm = listed.machine->path.corner_tolerance_mm;
+  }
+  return ReadPartProgram(made.text, options);
+}
+
+Source<v1::OperationBatch> OperationBatches(ListedProgram program) {
   return [listing = std::make_shared<Listing>(std::move(program))](
              v1::OperationBatch& batch) -> absl::StatusOr<bool> {
     const bool first = !listing->read;
@@ -69,21 +90,62 @@ Source<v1::OperationBatch> OperationBatches(std::string program) {
   };
 }
 
-Source<v1::ExportPiece> CanonicalPieces(std::string program) {
+namespace {
+
+Source<v1::ExportPiece> CanonicalPieces(ListedProgram program) {
   return [listing =
               std::make_shared<Listing>(std::move(program))](v1::ExportPiece& piece) -> absl::StatusOr<bool> {
     listing->Read();
     const PartProgram& read = listing->program;
     if (!read.faults.empty()) {
-      const ProgramFault& fault = read.faults.front();
-      return Trouble(absl::StatusCode::kFailedPrecondition, std::string(fault.reason),
-                     "line " + std::to_string(fault.line) + ": " + fault.message);
+      return FaultStatus(read.faults.front());
     }
     std::string& text = *piece.mutable_content();
     while (text.size() < kBytesPerPiece && listing->next < read.operations.size()) {
       text += FormatOperation(read.operations[listing->next++]) + "\n";
     }
     return !text.empty();
+  };
+}
+
+absl::StatusOr<std::string> Written(const PartProgram& read, v1::ExportRequest::Format format) {
+  if (!read.faults.empty()) {
+    return FaultStatus(read.faults.front());
+  }
+  if (format == v1::ExportRequest::FORMAT_CLDATA) {
+    CldataText cldata = WriteCldata(read.operations, "exported by lambdajet");
+    return cldata.faults.empty() ? absl::StatusOr<std::string>(std::move(cldata.text))
+                                 : FaultStatus(cldata.faults.front());
+  }
+  std::optional<std::string> gcode = OperationsText(read.operations, "exported by lambdajet");
+  return gcode ? absl::StatusOr<std::string>(std::move(*gcode))
+               : Trouble(absl::StatusCode::kFailedPrecondition, "NOT_WRITABLE",
+                         "G-code as it is written here has no words for an arc outside G17");
+}
+
+}  // namespace
+
+Source<v1::ExportPiece> ProgramPieces(ListedProgram program, v1::ExportRequest::Format format) {
+  if (format == v1::ExportRequest::FORMAT_CANONICAL) {
+    return CanonicalPieces(std::move(program));
+  }
+  struct Writing {
+    ListedProgram listed;
+    std::optional<std::string> text;
+    std::size_t next = 0;
+  };
+  return [format, writing = std::make_shared<Writing>(Writing{std::move(program), std::nullopt})](
+             v1::ExportPiece& piece) -> absl::StatusOr<bool> {
+    if (!writing->text) {
+      auto text = Written(ReadListed(std::move(writing->listed)), format);
+      if (!text.ok()) {
+        return text.status();
+      }
+      writing->text = std::move(*text);
+    }
+    piece.set_content(writing->text->substr(writing->next, kBytesPerPiece));
+    writing->next += piece.content().size();
+    return !piece.content().empty();
   };
 }
 

@@ -15,11 +15,21 @@ namespace lambdajet::trajectory {
 template <typename Message>
 using Source = std::function<absl::StatusOr<bool>(Message&)>;
 
-Source<v1::OperationBatch> OperationBatches(std::string program);
+// A program to list or to write, and the machine whose kerf it may ask for; null: none is known.
+struct ListedProgram {
+  SubmittedProgram program;
+  std::shared_ptr<const MachineDescription> machine;
+};
 
-// A program with faults ends the stream with FAILED_PRECONDITION and the first one's reason.
-Source<v1::ExportPiece> CanonicalPieces(std::string program);
+Source<v1::OperationBatch> OperationBatches(ListedProgram program);
+
+// As canonical list, G-code or CLDATA. A program with faults ends the stream with FAILED_PRECONDITION and the first one's
+// reason; one that the format has no words for with NOT_WRITABLE or the writer's reason.
+Source<v1::ExportPiece> ProgramPieces(ListedProgram program, v1::ExportRequest::Format format);
 
 Source<v1::ExportPiece> SamplePieces(std::shared_ptr<const PlannedProgram> planned, double step_s);
+
+// All operations of a program; the faults otherwise.
+PartProgram ReadListed(ListedProgram program);
 
 }  // namespace lambdajet::trajectory

@@ -7,7 +7,6 @@
 #include "platform/rpc/argument_checks.hpp"
 #include "platform/rpc/handlers.hpp"
 #include "platform/rpc/streams.hpp"
-#include "trajectory/core/part_program/read_program.hpp"
 #include "trajectory/rpc/admission.hpp"
 #include "trajectory/rpc/program_streams.hpp"
 #include "trajectory/rpc/wire.hpp"
@@ -20,6 +19,7 @@ constexpr std::size_t kMostWaiting = 16;
 constexpr std::size_t kMostListedOperations = 200000;
 constexpr int kPointsPerBatch = 2000;
 constexpr double kDefaultStep_s = 0.004;
+constexpr double kDefaultPeriod_s = 0.1;
 constexpr int kDefaultPage = 20;
 constexpr std::size_t kMostStepsWaiting = 64;
 
@@ -77,17 +77,32 @@ absl::StatusOr<std::shared_ptr<const PlanRecord>> TrajectoryRpc::DonePlan(std::u
   return record;
 }
 
+// A request's program, options and machine, or the first thing that is wrong.
+template <typename Request>
+absl::StatusOr<TrajectoryRpc::Asked> TrajectoryRpc::FromRequest(const Request& request) const {
+  auto program = ProgramOf(request);
+  if (!program.ok()) {
+    return program.status();
+  }
+  auto options = FromWire(request.options());
+  if (!options.ok()) {
+    return options.status();
+  }
+  auto machine = MachineFor(request.options());
+  if (!machine.ok()) {
+    return machine.status();
+  }
+  return Asked{std::move(*program), std::move(*options), std::move(*machine)};
+}
+
 absl::Status TrajectoryRpc::Admit(const v1::AdmitProgramRequest& request,
                                   v1::AdmitProgramResponse& response) const {
-  if (const absl::Status status = CheckProgram(request.program()); !status.ok()) {
-    return status;
+  auto asked = FromRequest(request);
+  if (!asked.ok()) {
+    return asked.status();
   }
-  const auto options = FromWire(request.options());
-  const auto machine = MachineFor(request.options());
-  if (!options.ok() || !machine.ok()) {
-    return options.ok() ? machine.status() : options.status();
-  }
-  ToWire(AdmitPartProgram(request.program(), **machine, *options), **machine, response);
+  const MadeProgram program = MakeProgram(std::move(asked->program), asked->machine.get());
+  ToWire(AdmitMade(program, *asked->machine, asked->options), *asked->machine, response);
   return absl::OkStatus();
 }
 
@@ -100,15 +115,12 @@ grpc::ServerUnaryReactor* TrajectoryRpc::AdmitProgram(grpc::CallbackServerContex
 
 absl::Status TrajectoryRpc::BeginPlan(const v1::PlanProgramRequest& request,
                                       v1::PlanProgramResponse& response) {
-  if (const absl::Status status = CheckProgram(request.program()); !status.ok()) {
-    return status;
+  auto asked = FromRequest(request);
+  if (!asked.ok()) {
+    return asked.status();
   }
-  const auto options = FromWire(request.options());
-  const auto machine = MachineFor(request.options());
-  if (!options.ok() || !machine.ok()) {
-    return options.ok() ? machine.status() : options.status();
-  }
-  const auto record = desk_.Begin(request.program(), *options, *machine);
+  MadeProgram program = MakeProgram(std::move(asked->program), asked->machine.get());
+  const auto record = desk_.Begin(std::move(program), std::move(asked->options), asked->machine);
   if (!record.ok()) {
     return record.status();
   }
@@ -117,10 +129,15 @@ absl::Status TrajectoryRpc::BeginPlan(const v1::PlanProgramRequest& request,
   return absl::OkStatus();
 }
 
+// A drawing becomes a program first, which is work for the pool.
 grpc::ServerUnaryReactor* TrajectoryRpc::PlanProgram(grpc::CallbackServerContext* context,
                                                      const v1::PlanProgramRequest* request,
                                                      v1::PlanProgramResponse* response) {
-  return Answer(context, [&] { return BeginPlan(*request, *response); });
+  if (request->format() != type::v1::PROGRAM_FORMAT_DXF) {
+    return Answer(context, [&] { return BeginPlan(*request, *response); });
+  }
+  return AnswerOn(pool_, context,
+                  [this, request, response](const Cancelled&) { return BeginPlan(*request, *response); });
 }
 
 grpc::ServerUnaryReactor* TrajectoryRpc::GetPlan(grpc::CallbackServerContext* context,
@@ -131,20 +148,25 @@ grpc::ServerUnaryReactor* TrajectoryRpc::GetPlan(grpc::CallbackServerContext* co
     if (record == nullptr) {
       return UnknownPlan(request->plan_id());
     }
-    ToWire(*record, *response->mutable_operation());
-    const PlanState state = record->state;
-    if (state == PlanState::kDone) {
-      ToWire(*record, *response->mutable_summary());
-    } else if (state == PlanState::kFailed) {
-      for (const ProgramFault& fault : record->planned->faults) {
-        ToWire(fault, *response->add_faults());
-      }
-      if (!record->tolerance.blame.empty()) {
-        ToWire(record->tolerance.blame.front(), *response->mutable_blame());
-      }
-    }
+    ToWire(*record, *response);
     return absl::OkStatus();
   });
+}
+
+grpc::ServerWriteReactor<v1::GetPlanResponse>* TrajectoryRpc::WatchPlan(grpc::CallbackServerContext* context,
+                                                                        const v1::WatchPlanRequest* request) {
+  if (const absl::Status wanted = CheckStillWanted(*context); !wanted.ok()) {
+    return RefuseStream<v1::GetPlanResponse>(wanted);
+  }
+  ArgumentChecks checks;
+  const double period_s = request->has_period_s() ? request->period_s() : kDefaultPeriod_s;
+  checks.InRange("period_s", period_s, 0.02, 10.0, "s");
+  if (!checks.ok()) {
+    return RefuseStream<v1::GetPlanResponse>(checks.status());
+  }
+  auto record = desk_.Find(request->plan_id());
+  return record == nullptr ? RefuseStream<v1::GetPlanResponse>(UnknownPlan(request->plan_id()))
+                           : watch_.Open(std::move(record), period_s);
 }
 
 grpc::ServerUnaryReactor* TrajectoryRpc::CancelPlan(grpc::CallbackServerContext* context,
@@ -190,7 +212,10 @@ grpc::ServerUnaryReactor* TrajectoryRpc::ListPlans(grpc::CallbackServerContext* 
 }
 
 grpc::ServerWriteReactor<v1::SampleBatch>* TrajectoryRpc::StreamSamples(
-    grpc::CallbackServerContext*, const v1::StreamSamplesRequest* request) {
+    grpc::CallbackServerContext* context, const v1::StreamSamplesRequest* request) {
+  if (const absl::Status wanted = CheckStillWanted(*context); !wanted.ok()) {
+    return RefuseStream<v1::SampleBatch>(wanted);
+  }
   ArgumentChecks checks;
   const double step_s = request->has_step_s() ? request->step_s() : kDefaultStep_s;
   checks.InRange("step_s", step_s, 0.0005, 1.0, "s");
@@ -215,14 +240,25 @@ grpc::ServerWriteReactor<v1::SampleBatch>* TrajectoryRpc::StreamSamples(
   });
 }
 
+// What a list is made of; the machine is the active one, if there is one.
+template <typename Wire>
+absl::StatusOr<ListedProgram> TrajectoryRpc::ListedOf(const Wire& wire) const {
+  auto program = ProgramOf(wire);
+  if (!program.ok()) {
+    return program.status();
+  }
+  return ListedProgram{std::move(*program), find_machine_(std::nullopt)};
+}
+
 grpc::ServerUnaryReactor* TrajectoryRpc::ListOperations(grpc::CallbackServerContext* context,
                                                         const v1::ListOperationsRequest* request,
                                                         v1::ListOperationsResponse* response) {
-  return AnswerOn(pool_, context, [request, response](const Cancelled&) -> absl::Status {
-    if (const absl::Status status = CheckProgram(request->program()); !status.ok()) {
-      return status;
+  return AnswerOn(pool_, context, [this, request, response](const Cancelled&) -> absl::Status {
+    auto listed = ListedOf(*request);
+    if (!listed.ok()) {
+      return listed.status();
     }
-    const PartProgram program = ReadPartProgram(request->program());
+    const PartProgram program = ReadListed(std::move(*listed));
     for (const ProgramFault& fault : program.faults) {
       ToWire(fault, *response->add_faults());
     }
@@ -247,16 +283,13 @@ grpc::ServerWriteReactor<v1::AdmissionStep>* TrajectoryRpc::AdmitProgramInSteps(
   if (const absl::Status wanted = CheckStillWanted(*context); !wanted.ok()) {
     return RefuseStream<v1::AdmissionStep>(wanted);
   }
-  absl::Status status = CheckProgram(request->program());
-  const auto options = FromWire(request->options());
-  const auto machine = MachineFor(request->options());
-  status = !status.ok() ? status : !options.ok() ? options.status() : machine.status();
-  if (!status.ok()) {
-    return RefuseStream<v1::AdmissionStep>(status);
+  auto asked = FromRequest(*request);
+  if (!asked.ok()) {
+    return RefuseStream<v1::AdmissionStep>(asked.status());
   }
   auto stream = PushStream<v1::AdmissionStep>::New(kMostStepsWaiting);
-  auto admission =
-      std::make_shared<AdmissionInSteps>(request->program(), *options, *machine, desk_, closing_);
+  auto admission = std::make_shared<AdmissionInSteps>(std::move(asked->program), asked->options,
+                                                      asked->machine, desk_, closing_);
   const absl::Status queued = admissions_.Submit([stream, admission] {
     stream->Finish(Guarded([&] {
       return admission->Run([&stream](v1::AdmissionStep step) { return stream->Push(std::move(step)); });
@@ -267,10 +300,32 @@ grpc::ServerWriteReactor<v1::AdmissionStep>* TrajectoryRpc::AdmitProgramInSteps(
 
 grpc::ServerWriteReactor<v1::OperationBatch>* TrajectoryRpc::StreamOperations(
     grpc::CallbackServerContext* context, const v1::ListOperationsRequest* request) {
-  absl::Status status = CheckStillWanted(*context);
-  status.Update(CheckProgram(request->program()));
-  return status.ok() ? NewPullStream<v1::OperationBatch>(OperationBatches(request->program()))
-                     : RefuseStream<v1::OperationBatch>(status);
+  if (const absl::Status wanted = CheckStillWanted(*context); !wanted.ok()) {
+    return RefuseStream<v1::OperationBatch>(wanted);
+  }
+  auto listed = ListedOf(*request);
+  return listed.ok() ? NewPullStream<v1::OperationBatch>(OperationBatches(std::move(*listed)))
+                     : RefuseStream<v1::OperationBatch>(listed.status());
+}
+
+// The program that an export is made from: the plan's, or the request's own.
+absl::StatusOr<ListedProgram> TrajectoryRpc::ExportedProgram(const v1::ExportRequest& request) const {
+  if (request.plan_id() == 0) {
+    auto program =
+        FromWire(request.program(), request.program_format(), request.has_toolpath(), request.toolpath());
+    return program.ok() ? absl::StatusOr<ListedProgram>({std::move(*program), find_machine_(std::nullopt)})
+                        : program.status();
+  }
+  const auto record = DonePlan(request.plan_id());
+  if (!record.ok()) {
+    return record.status();
+  }
+  if ((*record)->program.empty()) {
+    return Trouble(absl::StatusCode::kFailedPrecondition, "PROGRAM_NOT_KEPT",
+                   "the program of this plan is larger than " + std::to_string(PlanDesk::kMostKeptBytes) +
+                       " bytes and is not kept; send it as `program`");
+  }
+  return ListedProgram{{(*record)->program, (*record)->options.notation, std::nullopt}, (*record)->machine};
 }
 
 grpc::ServerWriteReactor<v1::ExportPiece>* TrajectoryRpc::Export(grpc::CallbackServerContext* context,
@@ -287,10 +342,10 @@ grpc::ServerWriteReactor<v1::ExportPiece>* TrajectoryRpc::Export(grpc::CallbackS
   if (!checks.ok()) {
     return RefuseStream<v1::ExportPiece>(checks.status());
   }
-  if (request->format() == v1::ExportRequest::FORMAT_CANONICAL) {
-    const absl::Status status = CheckProgram(request->program());
-    return status.ok() ? NewPullStream<v1::ExportPiece>(CanonicalPieces(request->program()))
-                       : RefuseStream<v1::ExportPiece>(status);
+  if (request->format() != v1::ExportRequest::FORMAT_SAMPLES_CSV) {
+    auto listed = ExportedProgram(*request);
+    return listed.ok() ? NewPullStream<v1::ExportPiece>(ProgramPieces(std::move(*listed), request->format()))
+                       : RefuseStream<v1::ExportPiece>(listed.status());
   }
   const auto found = DonePlan(request->plan_id());
   return found.ok() ? NewPullStream<v1::ExportPiece>(SamplePieces((*found)->planned, step_s))

@@ -13,6 +13,8 @@
 #include "lambdajet/trajectory/v1/trajectory.grpc.pb.h"
 #include "platform/rpc/work_pool.hpp"
 #include "trajectory/rpc/plan_desk.hpp"
+#include "trajectory/rpc/plan_watch.hpp"
+#include "trajectory/rpc/program_streams.hpp"
 
 namespace lambdajet::trajectory {
 
@@ -39,6 +41,8 @@ class TrajectoryRpc final : public v1::TrajectoryService::CallbackService {
                                         v1::PlanProgramResponse* response) override;
   grpc::ServerUnaryReactor* GetPlan(grpc::CallbackServerContext* context, const v1::GetPlanRequest* request,
                                     v1::GetPlanResponse* response) override;
+  grpc::ServerWriteReactor<v1::GetPlanResponse>* WatchPlan(grpc::CallbackServerContext* context,
+                                                           const v1::WatchPlanRequest* request) override;
   grpc::ServerUnaryReactor* CancelPlan(grpc::CallbackServerContext* context,
                                        const v1::CancelPlanRequest* request,
                                        v1::CancelPlanResponse* response) override;
@@ -64,6 +68,17 @@ class TrajectoryRpc final : public v1::TrajectoryService::CallbackService {
                                           v1::StopStreamingResponse* response) override;
 
  private:
+  struct Asked {
+    SubmittedProgram program;
+    PlanOptions options;
+    std::shared_ptr<const MachineDescription> machine;
+  };
+
+  template <typename Request>
+  absl::StatusOr<Asked> FromRequest(const Request& request) const;
+  template <typename Wire>
+  absl::StatusOr<ListedProgram> ListedOf(const Wire& wire) const;
+  absl::StatusOr<ListedProgram> ExportedProgram(const v1::ExportRequest& request) const;
   absl::StatusOr<std::shared_ptr<const MachineDescription>> MachineFor(const v1::PlanOptions& options) const;
   absl::Status Admit(const v1::AdmitProgramRequest& request, v1::AdmitProgramResponse& response) const;
   absl::Status BeginPlan(const v1::PlanProgramRequest& request, v1::PlanProgramResponse& response);
@@ -72,6 +87,7 @@ class TrajectoryRpc final : public v1::TrajectoryService::CallbackService {
   FindMachine find_machine_;
   Streaming streaming_;
   PlanDesk& desk_;
+  PlanWatch watch_;
   WorkPool pool_;
   std::atomic<bool> closing_ = false;
   WorkPool admissions_;  // last: its threads wait for plans

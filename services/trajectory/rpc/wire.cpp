@@ -36,22 +36,6 @@ std::string Printable(std::string_view text) {
   return printable;
 }
 
-}  // namespace
-
-absl::Status CheckProgram(const std::string& program) {
-  ArgumentChecks checks;
-  checks.NonEmpty("program", program);
-  checks.Require(program.size() <= kMostProgramBytes, "program", "PROGRAM_TOO_LARGE",
-                 "the program has " + std::to_string(program.size()) + " bytes; at most " +
-                     std::to_string(kMostProgramBytes) + " are taken");
-  if (checks.ok()) {
-    checks.Text("program", program, kMostProgramBytes);
-  }
-  return checks.status();
-}
-
-namespace {
-
 void CheckTolerances(const v1::PlanOptions& wire, ArgumentChecks& checks) {
   if (wire.has_tolerance_mm()) {
     checks.InRange("options.tolerance_mm", wire.tolerance_mm(), kLeastTolerance_mm, kMostTolerance_mm, "mm");
@@ -92,6 +76,16 @@ absl::StatusOr<PlanOptions> FromWire(const v1::PlanOptions& wire) {
     return checks.status();
   }
   return options;
+}
+
+Admission AdmitMade(const MadeProgram& program, const MachineDescription& machine, PlanOptions options) {
+  if (!program.faults.empty()) {
+    Admission refused;
+    refused.faults = program.faults;
+    return refused;
+  }
+  options.notation = program.notation;
+  return AdmitPartProgram(program.text, machine, options);
 }
 
 void ToWire(const MachineDescription& machine, machine::v1::ModelVersion& wire) {
@@ -204,6 +198,21 @@ void ToWire(const ToleranceBlame& blame, v1::ToleranceBlame& wire) {
   wire.set_source(Word(accuracy::SourceName(blame.source)));
   wire.set_remedy(Word(blame.remedy));
   wire.set_with_remedy_mm(blame.with_remedy_mm);
+}
+
+void ToWire(const PlanRecord& record, v1::GetPlanResponse& wire) {
+  ToWire(record, *wire.mutable_operation());
+  const PlanState state = record.state;  // after the operation: what that says to be done has its summary
+  if (state == PlanState::kDone) {
+    ToWire(record, *wire.mutable_summary());
+  } else if (state == PlanState::kFailed) {
+    for (const ProgramFault& fault : record.planned->faults) {
+      ToWire(fault, *wire.add_faults());
+    }
+    if (!record.tolerance.blame.empty()) {
+      ToWire(record.tolerance.blame.front(), *wire.mutable_blame());
+    }
+  }
 }
 
 void AddPoint(const PlannedProgram& planned, double tau_s, v1::SampleBatch& wire) {

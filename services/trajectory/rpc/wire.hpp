@@ -1,7 +1,6 @@
-// Translates between lambdajet.trajectory.v1 and the core.
+// Translates between lambdajet.trajectory.v1 and the core; programs: submitted_program.hpp.
 //
-// Threads: pure. Errors: FromWire says INVALID_ARGUMENT with every field that is wrong; a program beyond kMostProgramBytes is
-// PROGRAM_TOO_LARGE (the door takes messages of 128 MiB, so that it can say so).
+// Threads: pure. Errors: FromWire says INVALID_ARGUMENT with every field that is wrong.
 #pragma once
 
 #include <string>
@@ -12,16 +11,17 @@
 
 namespace lambdajet::trajectory {
 
-inline constexpr std::size_t kMostProgramBytes = 64u << 20;
-
-absl::Status CheckProgram(const std::string& program);
 absl::StatusOr<PlanOptions> FromWire(const v1::PlanOptions& wire);
+
+// A program with faults is not admitted for these.
+Admission AdmitMade(const MadeProgram& program, const MachineDescription& machine, PlanOptions options);
 
 void ToWire(const MachineDescription& machine, machine::v1::ModelVersion& wire);
 void ToWire(const ProgramFault& fault, v1::ProgramFault& wire);
 void ToWire(const Admission& admission, const MachineDescription& machine, v1::AdmitProgramResponse& wire);
 void ToWire(const PlanRecord& record, type::v1::Operation& wire);
 void ToWire(const PlanRecord& record, v1::PlanSummary& wire);
+void ToWire(const PlanRecord& record, v1::GetPlanResponse& wire);
 void ToWire(const ToleranceBlame& blame, v1::ToleranceBlame& wire);
 
 // One point into a batch of stride 12.

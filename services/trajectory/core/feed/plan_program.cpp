@@ -51,8 +51,9 @@ PathDefaults DefaultsOf(const MachineDescription& machine, const PlanOptions& op
   return d;
 }
 
-ReadOptions ReaderOptionsOf(const MachineDescription& machine) {
+ReadOptions ReaderOptionsOf(const MachineDescription& machine, const PlanOptions& wanted) {
   ReadOptions options;
+  options.notation = wanted.notation;
   options.compensate_kerf = true;
   options.gcode.default_tolerance_mm = machine.path.corner_tolerance_mm;
   options.gcode.kerf_width_mm = machine.process.kerf_width_mm;
@@ -340,6 +341,9 @@ std::uint64_t PlanIdOf(std::string_view program, const PlanOptions& o, const Mac
       hash.Number(number);
     }
   }
+  if (o.notation != ProgramNotation::kByContent) {
+    hash.Number(static_cast<double>(o.notation));
+  }
   hash.Bytes(machine.machine_id);
   hash.Bytes(machine.hash);
   for (Eigen::Index i = 0; i < machine.parameters.size(); ++i) {
@@ -354,7 +358,7 @@ ProgramPath LayOutProgram(std::string_view program, const MachineDescription& ma
   if (!faults.empty()) {
     return {};
   }
-  PartProgram read = ReadPartProgram(program, ReaderOptionsOf(machine));
+  PartProgram read = ReadPartProgram(program, ReaderOptionsOf(machine, options));
   faults = std::move(read.faults);
   if (!faults.empty()) {
     return {};
@@ -398,7 +402,7 @@ Admission AdmitPartProgram(std::string_view program, const MachineDescription& m
                            const PlanOptions& options) {
   Admission admission;
   admission.faults = OptionFaults(options);
-  PartProgram read = ReadPartProgram(program, ReaderOptionsOf(machine));
+  PartProgram read = ReadPartProgram(program, ReaderOptionsOf(machine, options));
   admission.faults.insert(admission.faults.end(), read.faults.begin(), read.faults.end());
   if (!admission.faults.empty()) {
     return admission;

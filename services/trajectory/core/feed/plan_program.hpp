@@ -24,7 +24,7 @@
 #include "trajectory/core/feed/pace.hpp"
 #include "trajectory/core/feed/program_path.hpp"
 #include "trajectory/core/feed/speed_profile.hpp"
-#include "trajectory/core/part_program/operation.hpp"
+#include "trajectory/core/part_program/read_program.hpp"
 
 namespace lambdajet::trajectory {
 
@@ -46,7 +46,8 @@ struct PlanOptions {
   double sample_s = 0.004;                // distance of PlanSamples
   double knot_s = 0.002;
   int knots_per_segment = 4;
-  std::vector<ToleranceWish> hold;   // feed from tolerance (core/tolerance); empty: not asked
+  std::vector<ToleranceWish> hold;  // feed from tolerance (core/tolerance); empty: not asked
+  ProgramNotation notation = ProgramNotation::kByContent;
   std::shared_ptr<const Pace> pace;  // slower than the limits allow, place by place; none: as fast as they do
 };
 

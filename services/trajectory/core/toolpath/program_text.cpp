@@ -253,19 +253,49 @@ class OperationWriter {
 
   void Feed(double mm_per_s) {
     if (mm_per_s > 0.0 && mm_per_s != feed_) {
-      Line("F" + Number(mm_per_s * kSecondsPerMinute));
+      Line(timed_ ? "G94 F" + Number(mm_per_s * kSecondsPerMinute)
+                  : "F" + Number(mm_per_s * kSecondsPerMinute));
       feed_ = mm_per_s;
+      timed_ = false;
     }
   }
 
+  // What a motion says of its pace in its own line: nothing under G94, one over its minutes under G93.
+  std::string Pace(const Operation& o) {
+    if (!(o.value > 0.0) || o.feed_mm_per_s > 0.0) {
+      Feed(o.feed_mm_per_s);
+      return "";
+    }
+    if (!timed_) {
+      Line("G93");
+      timed_ = true;
+      feed_ = -1.0;
+    }
+    char word[40];
+    std::snprintf(word, sizeof word, " F%.12g", kSecondsPerMinute / o.value);
+    return word;
+  }
+
+  void Kerf(double offset_mm) {
+    if (offset_mm == kerf_mm_) {
+      return;
+    }
+    if (kerf_mm_ != 0.0) {
+      Line("G40");
+    }
+    if (offset_mm != 0.0) {
+      Line((offset_mm > 0.0 ? "G41.1 D" : "G42.1 D") + Number(2.0 * std::abs(offset_mm)));
+    }
+    kerf_mm_ = offset_mm;
+  }
+
   bool Motion(const Operation& o) {
-    if (o.plane != ArcPlane::kXy || (o.value > 0.0 && !(o.feed_mm_per_s > 0.0))) {
+    if (o.plane != ArcPlane::kXy) {
       return false;
     }
+    Kerf(o.kerf_offset_mm);
     const bool arc = o.kind == OperationKind::kFeedArc;
-    if (o.kind != OperationKind::kTraverse) {
-      Feed(o.feed_mm_per_s);
-    }
+    const std::string pace = o.kind == OperationKind::kTraverse ? "" : Pace(o);
     std::string line = arc                                  ? (o.sweep_rad > 0.0 ? "G3" : "G2")
                        : o.kind == OperationKind::kTraverse ? "G0"
                                                             : "G1";
@@ -284,13 +314,14 @@ class OperationWriter {
       const int turns = static_cast<int>(std::ceil(std::abs(o.sweep_rad) / (2.0 * std::numbers::pi) - 1e-9));
       line += turns > 1 ? " P" + std::to_string(turns) : "";
     }
-    Line(line);
+    Line(line + pace);
     x_ = x;
     y_ = y;
     return true;
   }
 
-  double x_ = 0.0, y_ = 0.0, feed_ = -1.0;
+  double x_ = 0.0, y_ = 0.0, feed_ = -1.0, kerf_mm_ = 0.0;
+  bool timed_ = false;  // G93
 };
 
 }  // namespace

@@ -21,7 +21,7 @@ std::string ReferenceDrawingText(const ContourSet& contours, const Toolpath& too
                                  const ToolpathOptions& options, std::string_view name, double tolerance_mm);
 
 // Operations as a program of their own: absolute millimetres in W, whatever units, offsets and modes they came from. Nothing
-// where one of them has no such words: arcs outside G17, motions with a duration in the place of a feed.
+// where one of them has no such words: arcs outside G17. Motions that carry a kerf offset stand between G41.1 or G42.1 and G40.
 std::optional<std::string> OperationsText(const std::vector<Operation>& operations, std::string_view title);
 
 }  // namespace lambdajet::trajectory
