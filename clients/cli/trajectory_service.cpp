@@ -408,11 +408,22 @@ CLI::Option* AddSetting(CLI::App& verb, FormatOptions& options, const char* name
       ->group("Drawings");
 }
 
+void AddLayerOptions(CLI::App& verb, FormatOptions& options) {
+  using Settings = type::v1::ToolpathSettings;
+  using Names = std::vector<std::string>;
+  AddSetting<Names>(
+      verb, options, "--ignore", "layer to leave out, may be given again",
+      [](Settings& s, const Names& v) { s.mutable_ignore_layers()->Assign(v.begin(), v.end()); });
+  AddSetting<Names>(verb, options, "--cut", "layer to cut, may be given again; none: all others",
+                    [](Settings& s, const Names& v) { s.mutable_cut_layers()->Assign(v.begin(), v.end()); });
+  AddSetting<Names>(verb, options, "--mark", "layer to scribe along its lines, may be given again",
+                    [](Settings& s, const Names& v) { s.mutable_mark_layers()->Assign(v.begin(), v.end()); });
+}
+
 }  // namespace
 
 void AddFormatOptions(CLI::App& verb, FormatOptions& options) {
   using Settings = type::v1::ToolpathSettings;
-  using Names = std::vector<std::string>;
   constexpr double kDegree_rad = std::numbers::pi / 180.0;
   verb.add_option("--format", options.format, "file: as the name of the file ends, or as it begins")
       ->check(CLI::IsMember({"file", "gcode", "cldata", "dxf"}))
@@ -432,8 +443,8 @@ void AddFormatOptions(CLI::App& verb, FormatOptions& options) {
          [](Settings& s, double v) { s.set_overlap_mm(v); });
   number("--pierce-time-s", "0: the machine's own", [](Settings& s, double v) { s.set_pierce_time_s(v); });
   number("--tab-mm", "what a tab leaves standing", [](Settings& s, double v) { s.set_tab_mm(v); });
-  number("--tabs", "on each outline",
-         [](Settings& s, double v) { s.set_tab_count(static_cast<std::uint32_t>(std::max(0.0, v))); });
+  AddSetting<std::uint32_t>(verb, options, "--tabs", "on each outline",
+                            [](Settings& s, std::uint32_t v) { s.set_tab_count(v); });
   number("--turn-deg", "turns the drawing counter-clockwise",
          [](Settings& s, double v) { s.set_turn_rad(v * kDegree_rad); });
   AddSetting<std::string>(verb, options, "--lead", "none, line or arc; default arc",
@@ -456,13 +467,7 @@ void AddFormatOptions(CLI::App& verb, FormatOptions& options) {
                                     s.set_corner_y_w_mm(v[1]);
                                   })
       ->expected(2);
-  AddSetting<Names>(
-      verb, options, "--ignore", "layer to leave out, may be given again",
-      [](Settings& s, const Names& v) { s.mutable_ignore_layers()->Assign(v.begin(), v.end()); });
-  AddSetting<Names>(verb, options, "--cut", "layer to cut, may be given again; none: all others",
-                    [](Settings& s, const Names& v) { s.mutable_cut_layers()->Assign(v.begin(), v.end()); });
-  AddSetting<Names>(verb, options, "--mark", "layer to scribe along its lines, may be given again",
-                    [](Settings& s, const Names& v) { s.mutable_mark_layers()->Assign(v.begin(), v.end()); });
+  AddLayerOptions(verb, options);
   verb.add_flag_function(
           "--drawing-order",
           [&options](std::int64_t) {
