@@ -203,6 +203,53 @@ TEST(PathLaw, ContourKeepsItsShapeUnderHoldsOverridesAndRetraces) {
       worst_of_all_mm);
 }
 
+// RETRACE or RESUME at the instant of HELD, valves slow and drawn, also while a pierce is just beginning: the path runs
+// backwards only when no water flows, and it does run backwards.
+TEST(ReplayLaw, NoWaterFlowsWhileThePathRunsBackwards) {
+  int backed_up = 0;
+  for (std::uint64_t seed = 1; seed <= 60; ++seed) {
+    SCOPED_TRACE(seed);
+    Dice dice(seed);
+    MachineDescription machine = DemoMachine();
+    machine.process.jet_on_delay_s = dice.Between(0.01, 0.12);
+    machine.process.jet_off_delay_s = dice.Between(0.01, 0.12);
+    simulated_plant::PlantTruth truth = simulated_plant::NominalPlant(machine);
+    truth.jet_valve.on_delay_s *= dice.Between(0.8, 1.2);
+    truth.jet_valve.off_delay_s *= dice.Between(0.8, 1.2);
+    CellOptions options;
+    options.seed = seed;
+    // States are lost; the peer is not.
+    options.drive.peer_deadline_s = options.main_motion.drive_deadline_s = 0.1;
+    options.link = {
+        .delay_ns = 1000 * dice.Below(3000), .jitter_ns = 1'000'000, .loss = dice.Between(0.0, 0.2)};
+    VirtualCell cell(machine, truth, options);
+    cell.Begin(TwoCircles(machine, 40.0));
+    if (dice.Below(2) == 0) {
+      ASSERT_TRUE(cell.StepUntil([&] { return cell.drive().gate_waiting == 1; }, 20.0));
+      cell.Step(dice.Between(0.0, 0.5));
+    } else {
+      ASSERT_TRUE(cell.StepUntil([&] { return cell.drive().gate_passed == 1; }, 20.0));
+      cell.Step(dice.Between(0.2, 3.0));
+    }
+    cell.Send(Verb::kHold, kBoth);
+    ASSERT_TRUE(cell.StepUntil([&] { return cell.drive().mode == ModuleMode::kHeld; }, 5.0));
+    cell.Step(1e-3 * dice.Below(6));
+    const bool retrace = dice.Below(2) == 0;
+    cell.Send(retrace ? Verb::kRetrace : Verb::kResume, kBoth, 5.0);
+    for (int i = 0; i < 2000; ++i) {
+      cell.Step();
+      const bool backwards = cell.drive().s_rate_mm_per_s < -1e-6;
+      backed_up += backwards ? 1 : 0;
+      EXPECT_FALSE(backwards && cell.main_motion_plant().jet_on()) << "water at s " << cell.drive().s_mm;
+    }
+    if (!retrace) {
+      ASSERT_TRUE(cell.StepUntil([&] { return cell.drive().mode == ModuleMode::kRunning; }, 10.0))
+          << Name(cell.drive().mode) << " " << Name(cell.drive().reason);
+    }
+  }
+  EXPECT_GT(backed_up, 5000);
+}
+
 // Held anywhere, backed up, sent on again, some times a run: every millimetre between pierce and jet-off is cut after all,
 // and never while the path runs backwards.
 TEST(ReplayLaw, WhatIsRetracedIsCutAfterAll) {

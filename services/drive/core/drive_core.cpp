@@ -243,8 +243,7 @@ ModuleReason DriveCore::ObeyResume() {
   if (!PeerFit()) {
     return peer_lost_ ? ModuleReason::kPeerLost : ModuleReason::kPeerStopped;
   }
-  const bool back_up = cutting_at_hold_ && config_.resume_overlap_mm > 0.0;
-  Apply(back_up ? Event::kBackUp : Event::kResume, ModuleReason::kCommanded);
+  GoOn(ModuleReason::kCommanded);
   return ModuleReason::kNone;
 }
 
@@ -260,10 +259,14 @@ ModuleReason DriveCore::ObeyRetrace(double distance_mm) {
   if (!(distance_mm > 0.0 && std::isfinite(distance_mm))) {
     return ModuleReason::kActuatorLimit;
   }
-  if (!Apply(Event::kRetrace, ModuleReason::kCommanded)) {
+  if (mode_ != kHeld) {
     return ModuleReason::kWrongMode;
   }
-  BeginRetrace(distance_mm);
+  if (!PeerFit()) {
+    return peer_lost_ ? ModuleReason::kPeerLost : ModuleReason::kPeerStopped;
+  }
+  resume_afterwards_ = false;
+  backing_ = {Event::kRetrace, distance_mm, ModuleReason::kCommanded};
   return ModuleReason::kNone;
 }
 
@@ -350,7 +353,8 @@ void DriveCore::WatchPeer() {
   if (PeerFit()) {
     peer_unfit_since_ns_ = 0;
     // Main motion missed the drive for a moment and has taken the jet off; the path must not go on without it.
-    const bool jetless = peer_.mode == kHeld && peer_.reason == ModuleReason::kPeerLost;
+    const bool jetless =
+        (peer_.mode == kHolding || peer_.mode == kHeld) && peer_.reason == ModuleReason::kPeerLost;
     if (jetless && (mode_ == kRunning || (mode_ == kResuming && ramping_up_))) {
       Apply(Event::kHold, ModuleReason::kPeerLost);
     }
@@ -419,11 +423,9 @@ void DriveCore::WatchBuffer() {
     if (head.gate_waiting == 0 && AheadTau() < head.clock.StoppingTau(limits) + reserve_s) {
       Apply(Event::kHold, ModuleReason::kStarved);
     }
-  } else if (mode_ == kHeld && reason_ == ModuleReason::kStarved && PeerFit() &&
+  } else if (mode_ == kHeld && reason_ == ModuleReason::kStarved && PeerFit() && !backing_ &&
              (WholePlanHeld() || AheadTau() >= config_.refill_s)) {
-    // Main motion has taken the jet off; the cut is taken up as after any hold.
-    Apply(cutting_at_hold_ && config_.resume_overlap_mm > 0.0 ? Event::kBackUp : Event::kResume,
-          ModuleReason::kStarved);
+    GoOn(ModuleReason::kStarved);  // the cut is taken up as after any hold
   }
 }
 
@@ -462,6 +464,11 @@ void DriveCore::WatchMotion() {
   const PlayHead now = play_.At(now_ns_);
   if ((mode_ == kHolding || mode_ == kStopping) && !retracing_ && Standing()) {
     Apply(Event::kStandstill, reason_);
+  }
+  if (mode_ == kHeld && backing_ && WaterIsOff()) {
+    const Backing backing = *backing_;
+    Apply(backing.event, backing.reason);
+    BeginRetrace(backing.distance_mm);
   }
   if (mode_ == kHeld && resume_afterwards_ &&
       PeerFit()) {  // as soon as the peer is fit, if it is not just now
@@ -520,6 +527,7 @@ bool DriveCore::Apply(Event event, ModuleReason reason) {
     reason_ = reason;
   }
   if (mode_ != from) {
+    mode_since_ = state_.header.sequence_number;
     changes_[changes_made_++ % kModeChanges] = {now_ns_, from,     mode_,
                                                 reason_, plan_.id, play_.PointAt(now_ns_).s_mm};
   }
@@ -573,6 +581,7 @@ void DriveCore::Act(Action action) {
       break;
     case Action::kRampDown:
       retracing_ = false;
+      backing_.reset();
       ramping_up_ = false;
       resume_afterwards_ = false;
       arming_ = false;
@@ -581,16 +590,18 @@ void DriveCore::Act(Action action) {
       play_.Retarget(now_ns_, 0.0, RateLimitsNow());
       break;
     case Action::kBackUp:
-      BeginRetrace(config_.resume_overlap_mm);
+      backing_.reset();
       resume_afterwards_ = true;
       break;
     case Action::kRetrace:
+      backing_.reset();
       resume_afterwards_ = false;
       break;
     case Action::kResumeAfterwards:
       resume_afterwards_ = true;
       break;
     case Action::kAwaitPeer:
+      backing_.reset();
       resume_afterwards_ = false;
       ramping_up_ = false;
       resuming_since_ = state_.header.sequence_number;
@@ -605,10 +616,21 @@ void DriveCore::Act(Action action) {
         plan_.tau_s = play_.PointAt(now_ns_).tau_s;
       }
       positioning_ = arming_ = homing_ = retracing_ = ramping_up_ = false;
+      backing_.reset();
       start_at_ns_ = 0;
       hardware_.SetEnabled(false);
       play_.Stand(now_ns_, readings_.position_mm);
       break;
+  }
+}
+
+// Out of a hold. A cut is taken up from a little before, and that way back waits until no water flows.
+void DriveCore::GoOn(ModuleReason reason) {
+  const bool back_up = cutting_at_hold_ && config_.resume_overlap_mm > 0.0;
+  if (back_up && mode_ == kHeld) {
+    backing_ = {Event::kBackUp, config_.resume_overlap_mm, reason};
+  } else {
+    Apply(back_up ? Event::kBackUp : Event::kResume, reason);
   }
 }
 
@@ -715,6 +737,13 @@ bool DriveCore::Standing() const { return play_.At(now_ns_).standing() && play_.
 
 bool DriveCore::PeerFit() const {
   return !peer_lost_ && !peer_restarted_ && !PeerDown(peer_.mode) && peer_.plan == plan_.id && plan_.id != 0;
+}
+
+// Main motion says so, and says that it has heard of this standstill.
+bool DriveCore::WaterIsOff() const {
+  return PeerFit() && !peer_.jet_on && !peer_.abrasive_on && peer_.mode != kRunning &&
+         peer_.mode != kHolding && peer_.mode != kResuming && peer_.peer_session == config_.session &&
+         peer_.peer_sequence_number >= mode_since_;
 }
 
 bool DriveCore::PeerReadyToResume() const {

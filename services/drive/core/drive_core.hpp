@@ -95,6 +95,12 @@ class DriveCore {
     bool begun = false;
   };
 
+  struct Backing {  // a way back along the path that waits for the water to be off
+    Event event = Event::kRetrace;
+    double distance_mm = 0.0;
+    ModuleReason reason = ModuleReason::kNone;
+  };
+
   // Inputs.
   void TakeInputs(const DriveInputs& inputs);
   void TakePeer(const MainMotionState& peer);
@@ -124,6 +130,7 @@ class DriveCore {
   // Motion.
   bool Apply(Event event, ModuleReason reason);
   void Act(Action action);
+  void GoOn(ModuleReason reason);
   void BeginRetrace(double distance_mm);
   void PlayAhead();
   bool WithinLimits(const Setpoint& setpoint) const;
@@ -134,6 +141,7 @@ class DriveCore {
   bool Moving() const;
   bool Standing() const;
   bool PeerFit() const;
+  bool WaterIsOff() const;
   bool PeerReadyToResume() const;
   bool ClockFit() const;
   void Report();
@@ -164,10 +172,12 @@ class DriveCore {
   bool positioning_ = false;
   bool homing_ = false;
   bool resume_afterwards_ = false;
+  std::optional<Backing> backing_;
   bool retracing_ = false;
   double retrace_to_s_mm_ = 0.0;
   bool ramping_up_ = false;
   bool cutting_at_hold_ = false;
+  std::uint64_t mode_since_ = 0;      // sequence number of the last change of mode
   std::uint64_t resuming_since_ = 0;  // sequence number of the first RESUMING state
   std::int64_t start_at_ns_ = 0;
 

@@ -265,7 +265,8 @@ void MainMotionCore::WatchHardware() {
     homing_ = false;
     Apply(Event::kHomed, ModuleReason::kNone);
   }
-  if (mode_ == kStopping && !readings_.jet_on && !readings_.abrasive_on) {
+  if (closing_ && WaterGone()) {
+    closing_ = false;
     Apply(Event::kOutputsOff, reason_);
   }
 }
@@ -273,7 +274,7 @@ void MainMotionCore::WatchHardware() {
 void MainMotionCore::WatchPressure() {
   const bool low = readings_.jet_on &&
                    readings_.pump_pressure_mpa < config_.pressure_lost_ratio * config_.pump_pressure_mpa;
-  if (!low || !(mode_ == kRunning || mode_ == kHolding || mode_ == kResuming)) {
+  if (!low || closing_ || !(mode_ == kRunning || mode_ == kHolding || mode_ == kResuming)) {
     pressure_low_since_ns_ = 0;
   } else if (pressure_low_since_ns_ == 0) {
     pressure_low_since_ns_ = now_ns_;
@@ -284,7 +285,7 @@ void MainMotionCore::WatchPressure() {
 
 void MainMotionCore::WatchPeer() {
   peer_lost_ = peer_watch_.Turn(now_ns_, ToNs(config_.drive_deadline_s));
-  const bool already_off = mode_ == kHeld && reason_ == ModuleReason::kPeerLost;
+  const bool already_off = (mode_ == kHeld || closing_) && reason_ == ModuleReason::kPeerLost;
   if (peer_lost_ && !already_off) {
     Apply(Event::kPeerLost, ModuleReason::kPeerLost);
   }
@@ -314,10 +315,12 @@ void MainMotionCore::FollowDrive() {
       Apply(Event::kPeerHolding, drive.reason);
       break;
     case kHeld:
-      Apply(Event::kPeerHeld, drive.reason);
+      if (!closing_) {
+        Apply(Event::kPeerHeld, drive.reason);
+      }
       break;
     case kResuming:
-      if (mode_ == kHolding) {  // the drive stood between two of the states heard
+      if (mode_ == kHolding && !closing_) {  // the drive stood between two of the states heard
         Apply(Event::kPeerHeld, drive.reason);
       }
       Apply(Event::kPeerResuming, ModuleReason::kNone);
@@ -469,7 +472,7 @@ bool MainMotionCore::AdvancePierce() {
 // ---- process events
 
 void MainMotionCore::RunEvents() {
-  if ((mode_ != kRunning && mode_ != kHolding) || peer_lost_) {
+  if ((mode_ != kRunning && mode_ != kHolding) || closing_ || peer_lost_) {
     return;
   }
   std::array<bool, kValveCount> valve_seen{};
@@ -578,7 +581,9 @@ void MainMotionCore::TakeEffects() {
     if (effect.valve == Valve::kAbrasive) {
       abrasive_there_ = effect.on;
     }
-    Awaited& awaited = awaited_[static_cast<std::size_t>(effect.valve)];
+    const auto v = static_cast<std::size_t>(effect.valve);
+    on_its_way_until_ns_[v] = effect.on ? 0 : on_its_way_until_ns_[v];
+    Awaited& awaited = awaited_[v];
     if (!awaited.pending || awaited.on != effect.on) {
       continue;
     }
@@ -731,6 +736,7 @@ void MainMotionCore::Act(Action action) {
       break;
     case Action::kSuspend:
       WaterOff();
+      closing_ = true;
       break;
     case Action::kRestore: {
       const double s_mm = track_.newest().s_mm;
@@ -745,6 +751,7 @@ void MainMotionCore::Act(Action action) {
       break;
     case Action::kShutDown:
       WaterOff();
+      closing_ = true;
       hardware_.SetPump(false);
       arming_ = homing_ = false;
       break;
@@ -753,7 +760,12 @@ void MainMotionCore::Act(Action action) {
 
 void MainMotionCore::Command(Valve valve, bool on, std::int64_t at_ns) {
   hardware_.ScheduleOutput(valve, on, at_ns);
-  Awaited& awaited = awaited_[static_cast<std::size_t>(valve)];
+  const auto v = static_cast<std::size_t>(valve);
+  if (on) {
+    const double latest_s = delay_s(valve, true) + kDelayClamp * nominal_s_[v][1] + kDelaySlack_s;
+    on_its_way_until_ns_[v] = std::max(at_ns, now_ns_) + ToNs(latest_s);
+  }
+  Awaited& awaited = awaited_[v];
   awaited = {};
   awaited.pending = true;
   awaited.on = on;
@@ -776,6 +788,13 @@ void MainMotionCore::WaterOff() {
   pierce_ = PiercePhase::kNone;
   gate_running_ = 0;
   restoring_ = false;
+}
+
+// The sensors see nothing, and nothing that was told to come on can still come.
+bool MainMotionCore::WaterGone() const {
+  return !readings_.jet_on && !readings_.abrasive_on &&
+         std::ranges::all_of(on_its_way_until_ns_,
+                             [this](std::int64_t until_ns) { return now_ns_ >= until_ns; });
 }
 
 // What lies ahead of s is done again, what lies behind is not.

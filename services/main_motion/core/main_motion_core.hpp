@@ -4,7 +4,7 @@
 // next process events and schedules the outputs early by the valves' delays (learnt from the module's own sensor),
 // moving them as the prediction moves. At a pierce gate it acts only while the drive says that it stands there: stand-off,
 // pressure, jet, pierce time, abrasive; at a measuring gate it lets the machine settle and takes a picture. On a hold the
-// jet is taken off at standstill; a resume pierces again. If the drive falls silent, abrasive and jet go off at once and
+// jet is taken off at standstill, and HELD is said only when no water flows or can still come; a resume pierces again. If the drive falls silent, abrasive and jet go off at once and
 // the pump to idle. State machine: state_table.hpp.
 // Frames and units: mm, s, MPa, g/min; common time in ns; pictures in C.
 // Threads: one, the control loop. Cost: bounded; no allocation after construction. Errors: refusals are answers in the state.
@@ -142,6 +142,7 @@ class MainMotionCore {
   void Act(Action action);
   void Command(Valve valve, bool on, std::int64_t at_ns);
   void WaterOff();
+  bool WaterGone() const;
   void RewindEvents(double s_mm);
   bool WaterWantedAt(double s_mm) const;
   double PierceTimeAt(double s_mm) const;
@@ -183,6 +184,7 @@ class MainMotionCore {
   bool homing_ = false;
   bool arming_ = false;
   bool restoring_ = false;
+  bool closing_ = false;  // told to be off, and not yet known to be
 
   PiercePhase pierce_ = PiercePhase::kNone;
   double pierce_time_s_ = 0.0;
@@ -202,6 +204,7 @@ class MainMotionCore {
 
   std::array<Awaited, kValveCount> awaited_{};
   std::array<bool, kValveCount> scheduled_{};
+  std::array<std::int64_t, kValveCount> on_its_way_until_ns_{};  // water told to come on may come until then
   Ring<PendingRecord, 64> pending_records_;
   Ring<Measurement, 64> pending_pictures_;
   Ring<Measurement, 256> measurements_;

@@ -41,14 +41,15 @@ constexpr std::array kTable = std::to_array<Row>({
     {kArmed, E::kFault, {kFault, A::kShutDown}},
 
     {kRunning, E::kPeerHolding, {kHolding, A::kNone}},
-    {kRunning, E::kPeerHeld, {kHeld, A::kSuspend}},
+    {kRunning, E::kPeerHeld, {kHolding, A::kSuspend}},
     {kRunning, E::kPeerComplete, {kComplete, A::kFinish}},
-    {kRunning, E::kPeerLost, {kHeld, A::kShutDown}},
+    {kRunning, E::kPeerLost, {kHolding, A::kShutDown}},
     {kRunning, E::kStop, {kStopping, A::kShutDown}},
     {kRunning, E::kFault, {kFault, A::kShutDown}},
 
-    {kHolding, E::kPeerHeld, {kHeld, A::kSuspend}},
-    {kHolding, E::kPeerLost, {kHeld, A::kShutDown}},
+    {kHolding, E::kPeerHeld, {kHolding, A::kSuspend}},
+    {kHolding, E::kPeerLost, {kHolding, A::kShutDown}},
+    {kHolding, E::kOutputsOff, {kHeld, A::kNone}},
     {kHolding, E::kStop, {kStopping, A::kShutDown}},
     {kHolding, E::kFault, {kFault, A::kShutDown}},
 
@@ -58,9 +59,9 @@ constexpr std::array kTable = std::to_array<Row>({
     {kHeld, E::kFault, {kFault, A::kShutDown}},
 
     {kResuming, E::kRestored, {kRunning, A::kNone}},
-    {kResuming, E::kPeerHolding, {kHeld, A::kSuspend}},
-    {kResuming, E::kPeerHeld, {kHeld, A::kSuspend}},
-    {kResuming, E::kPeerLost, {kHeld, A::kShutDown}},
+    {kResuming, E::kPeerHolding, {kHolding, A::kSuspend}},
+    {kResuming, E::kPeerHeld, {kHolding, A::kSuspend}},
+    {kResuming, E::kPeerLost, {kHolding, A::kShutDown}},
     {kResuming, E::kStop, {kStopping, A::kShutDown}},
     {kResuming, E::kFault, {kFault, A::kShutDown}},
 
