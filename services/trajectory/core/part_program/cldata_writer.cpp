@@ -208,15 +208,17 @@ class Writer {
                  : "a tool's axis is written by B within half a turn, A within a quarter and no C");
       return;
     }
-    SetKerf(o.kerf_offset_mm);
     const Vector end = {o.x_W_mm, o.y_W_mm, o.z_W_mm};
-    if (o.kind == OperationKind::kTraverse) {
+    const bool cuts = o.kind != OperationKind::kTraverse;
+    if (cuts && o.value > 0.0) {  // before the side of the path, where a feed that is read stands
+      SetDuration(o.value);
+    } else if (cuts) {
+      SetFeed(o.feed_mm_per_s);
+    }
+    SetKerf(o.kerf_offset_mm);
+    if (!cuts) {
       Line("RAPID");
       on_circle_ = false;
-    } else if (o.value > 0.0) {
-      SetDuration(o.value);
-    } else {
-      SetFeed(o.feed_mm_per_s);
     }
     if (o.kind == OperationKind::kFeedArc) {
       Arc(o, end);
