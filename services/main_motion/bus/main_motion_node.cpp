@@ -1,15 +1,20 @@
 #include "main_motion/bus/main_motion_node.hpp"
 
+#include <atomic>
+#include <chrono>
 #include <cmath>
 #include <optional>
 #include <string>
+#include <thread>
 #include <utility>
+#include <variant>
 
 #include "lambdajet/drive/v1/state.schema.hpp"
 #include "lambdajet/drive/v1/statePubSubTypes.h"
 #include "lambdajet/main_motion/v1/state.schema.hpp"
 #include "lambdajet/main_motion/v1/statePubSubTypes.h"
 #include "link/bus/module_frame.hpp"
+#include "platform/bus/sample_slots.hpp"
 
 namespace lambdajet::main_motion {
 namespace {
@@ -33,6 +38,71 @@ struct MainMotionModule {
   static TopicSpec PeerTopic() {
     return {idl::drive::v1::STATE_TOPIC, idl::schema::k_lambdajet_drive_v1_state, "state"};
   }
+};
+
+using Result = std::variant<Measurement, ProcessRecord>;
+constexpr std::size_t kResults = 512;
+
+// Publishes what the loop has found out, in a thread of its own: a reliable write copies its functors on the heap inside Fast
+// DDS, whatever the profile says. A full history (nobody acknowledges) or queue loses results; the job's report shows how
+// many there were.
+class ResultsOut {
+ public:
+  explicit ResultsOut(Histogram deviation) : deviation_(std::move(deviation)) {}
+  ~ResultsOut() {
+    stop_.store(true, std::memory_order_release);
+    if (thread_.joinable()) {
+      thread_.join();
+    }
+  }
+  ResultsOut(const ResultsOut&) = delete;
+  ResultsOut& operator=(const ResultsOut&) = delete;
+
+  absl::Status Open(Participant& bus) {
+    auto measurements = Writer<motion_wire::MeasurementPubSubType>::Open(
+        bus, OwnTopic(motion_wire::MEASUREMENT_TOPIC, "setpoint"));
+    auto records = Writer<motion_wire::ProcessRecordPubSubType>::Open(
+        bus, OwnTopic(motion_wire::PROCESS_RECORD_TOPIC, "setpoint"));
+    for (const absl::Status& status : {measurements.status(), records.status()}) {
+      if (!status.ok()) {
+        return status;
+      }
+    }
+    measurements_.emplace(std::move(*measurements));
+    records_.emplace(std::move(*records));
+    thread_ = std::thread([this] { Run(); });
+    return absl::OkStatus();
+  }
+
+  void Put(const Result& result) { results_.Put(result, {}); }  // from the loop
+
+ private:
+  void Run() {
+    Result result;
+    while (!stop_.load(std::memory_order_acquire)) {
+      if (results_.TakeWithin(std::chrono::milliseconds(20), result)) {
+        std::visit([this](const auto& one) { Publish(one); }, result);
+      }
+    }
+  }
+  void Publish(const Measurement& measurement) {
+    link::ToWire(measurement, measurement_wire_);
+    measurements_->Write(measurement_wire_);
+  }
+  void Publish(const ProcessRecord& record) {
+    link::ToWire(record, record_wire_);
+    records_->Write(record_wire_);
+    deviation_.Observe(1e-3 * std::abs(record.deviation_mm));
+  }
+
+  Histogram deviation_;
+  SampleQueue<Result> results_{kResults};
+  motion_wire::Measurement measurement_wire_;
+  motion_wire::ProcessRecord record_wire_;
+  std::optional<Writer<motion_wire::MeasurementPubSubType>> measurements_;
+  std::optional<Writer<motion_wire::ProcessRecordPubSubType>> records_;
+  std::atomic<bool> stop_ = false;
+  std::thread thread_;
 };
 
 }  // namespace
@@ -60,29 +130,18 @@ class MainMotionNode::Inside {
         peer_age_(
             parts.metrics.AddGauge("lambdajet_link_peer_age_seconds", "Age of the newest drive state.")),
         pressure_(parts.metrics.AddGauge("lambdajet_pump_pressure_pascals", "Pump pressure.")),
-        deviation_(
-            parts.metrics.AddHistogram("lambdajet_process_event_deviation_meters",
-                                       "How far from its place on the path a process event took effect.",
-                                       {1e-6, 2e-6, 5e-6, 1e-5, 2e-5, 5e-5, 1e-4, 2e-4, 5e-4, 1e-3})),
+        results_(parts.metrics.AddHistogram("lambdajet_process_event_deviation_meters",
+                                            "How far from its place on the path a process event took effect.",
+                                            {1e-6, 2e-6, 5e-6, 1e-5, 2e-5, 5e-5, 1e-4, 2e-4, 5e-4, 1e-3})),
         frame_(parts, config.core, config.loop, hardware,
                {.before_step = std::move(before_cycle),
-                .after_step = [this] { PublishResults(); },
+                .after_step = [this] { HandOverResults(); },
                 .after_cycle = std::move(after_cycle),
                 .running = std::move(running)}) {}
 
   absl::Status Open() {
-    auto measurements = Writer<motion_wire::MeasurementPubSubType>::Open(
-        bus_, OwnTopic(motion_wire::MEASUREMENT_TOPIC, "setpoint"));
-    auto records = Writer<motion_wire::ProcessRecordPubSubType>::Open(
-        bus_, OwnTopic(motion_wire::PROCESS_RECORD_TOPIC, "setpoint"));
-    for (const absl::Status& status : {measurements.status(), records.status()}) {
-      if (!status.ok()) {
-        return status;
-      }
-    }
-    measurements_.emplace(std::move(*measurements));
-    records_.emplace(std::move(*records));
-    return frame_.Open();
+    absl::Status status = results_.Open(bus_);
+    return status.ok() ? frame_.Open() : status;
   }
 
   void UpdateMetrics() {
@@ -93,26 +152,18 @@ class MainMotionNode::Inside {
   }
 
  private:
-  // A full history (nobody acknowledges) loses results; the job's report shows how many there were.
-  void PublishResults() {
+  void HandOverResults() {
     while (const std::optional<Measurement> measurement = frame_.core().TakeMeasurement()) {
-      link::ToWire(*measurement, measurement_wire_);
-      measurements_->Write(measurement_wire_);
+      results_.Put(*measurement);
     }
     while (const std::optional<ProcessRecord> record = frame_.core().TakeProcessRecord()) {
-      link::ToWire(*record, record_wire_);
-      records_->Write(record_wire_);
-      deviation_.Observe(1e-3 * std::abs(record->deviation_mm));
+      results_.Put(*record);
     }
   }
 
   Participant& bus_;
   Gauge peer_age_, pressure_;
-  Histogram deviation_;
-  motion_wire::Measurement measurement_wire_;
-  motion_wire::ProcessRecord record_wire_;
-  std::optional<Writer<motion_wire::MeasurementPubSubType>> measurements_;
-  std::optional<Writer<motion_wire::ProcessRecordPubSubType>> records_;
+  ResultsOut results_;
   link::ModuleFrame<MainMotionModule> frame_;  // last: its loop uses the others
 };
 
