@@ -22,10 +22,35 @@ namespace v1 = trajectory::v1;
 using v1::TrajectoryService;
 
 constexpr double kPlanning_s = 600.0;
+const std::vector<std::string> kSpatialColumns = {"tau_s",
+                                                  "s_mm",
+                                                  "x_W_mm",
+                                                  "y_W_mm",
+                                                  "z_W_mm",
+                                                  "a_rad",
+                                                  "b_rad",
+                                                  "c_rad",
+                                                  "tip_mm_per_s",
+                                                  "path_mm_per_s",
+                                                  "strut_1_mm",
+                                                  "strut_2_mm",
+                                                  "strut_3_mm",
+                                                  "strut_4_mm",
+                                                  "strut_5_mm",
+                                                  "strut_6_mm",
+                                                  "strut_1_mm_per_s",
+                                                  "strut_2_mm_per_s",
+                                                  "strut_3_mm_per_s",
+                                                  "strut_4_mm_per_s",
+                                                  "strut_5_mm_per_s",
+                                                  "strut_6_mm_per_s",
+                                                  "cutting",
+                                                  "source_line"};
 
 struct ProgramOptions {
   std::string file;
   FormatOptions format;
+  std::string mechanism = "lambda";
   bool compensate = false;
   std::optional<double> tolerance_mm;
   std::vector<std::string> tolerance_lines;
@@ -36,9 +61,20 @@ struct ProgramOptions {
   std::optional<std::uint32_t> machine_version;
 };
 
+void AddMechanismOption(CLI::App& verb, std::string& mechanism) {
+  verb.add_option("--mechanism", mechanism, "the machine that is meant; hexapod: the service's own")
+      ->check(CLI::IsMember({"lambda", "hexapod"}))
+      ->capture_default_str();
+}
+
+v1::Mechanism MechanismOf(const std::string& name) {
+  return name == "hexapod" ? v1::MECHANISM_HEXAPOD : v1::MECHANISM_UNSPECIFIED;
+}
+
 void AddProgramOptions(CLI::App& verb, ProgramOptions& options) {
   verb.add_option("FILE", options.file, "G-code, CLDATA or DXF; - is standard input")->required();
   AddFormatOptions(verb, options.format);
+  AddMechanismOption(verb, options.mechanism);
   verb.add_flag("--compensate", options.compensate, "elastic feed-forward");
   verb.add_option("--tolerance-mm", options.tolerance_mm,
                   "feed from tolerance: as fast as the predicted contour error allows");
@@ -54,6 +90,7 @@ void AddProgramOptions(CLI::App& verb, ProgramOptions& options) {
 
 v1::PlanOptions ToWire(const ProgramOptions& options) {
   v1::PlanOptions wire;
+  wire.set_mechanism(MechanismOf(options.mechanism));
   wire.set_compensate(options.compensate);
   if (options.tolerance_mm) wire.set_tolerance_mm(*options.tolerance_mm);
   for (const std::string& text : options.tolerance_lines) {
@@ -99,7 +136,27 @@ void PrintFaults(const google::protobuf::RepeatedPtrField<v1::ProgramFault>& fau
   }
 }
 
-void PrintSummary(const v1::PlanSummary& plan, Output& output) {
+void PrintSpatial(const v1::PlanSummary& plan, Output& output) {
+  const v1::SpatialSummary& s = plan.spatial();
+  output.Table(
+      {{"what", "value", "unit"},
+       {{"plan", std::to_string(plan.plan_id()), ""},
+        {"hexapod", plan.model_version().machine_id(), ""},
+        {"duration without gates", Fixed(plan.duration_s(), 2), "s"},
+        {"gates", Fixed(plan.gate_time_s(), 2), "s"},
+        {"feed moves", Fixed(plan.cutting_time_s(), 2), "s"},
+        {"path, turns as shifts", Fixed(plan.length_mm(), 1), "mm"},
+        {"of it feed moves", Fixed(plan.cutting_length_mm(), 1), "mm"},
+        {"a turn counts at", Fixed(s.turn_radius_mm(), 1), "mm"},
+        {"segments", std::to_string(plan.segment_count()), ""},
+        {"gates and events", fmt::format("{} and {}", plan.gate_count(), plan.event_count()), ""},
+        {"path tolerance used", Fixed(plan.contour_tolerance_used_mm(), 4), "mm"},
+        {"turn tolerance used", Fixed(s.turn_deviation_rad(), 6), "rad"},
+        {"struts", fmt::format("{:.1f} to {:.1f}", s.shortest_strut_mm(), s.longest_strut_mm()), "mm"},
+        {"singular margin", Fixed(s.singular_margin_ratio(), 3), "mm/mm"}}});
+}
+
+void PrintLambda(const v1::PlanSummary& plan, Output& output) {
   output.Table({{"what", "value", "unit"},
                 {{"plan", std::to_string(plan.plan_id()), ""},
                  {"machine version", std::to_string(plan.model_version().version()), ""},
@@ -113,6 +170,10 @@ void PrintSummary(const v1::PlanSummary& plan, Output& output) {
                  {"compensated", plan.compensated() ? "yes" : "no", ""},
                  {"contour tolerance used", Fixed(plan.contour_tolerance_used_mm(), 4), "mm"},
                  {"predicted 95 % bound", Fixed(plan.predicted_95_mm(), 4), "mm"}}});
+}
+
+void PrintSummary(const v1::PlanSummary& plan, Output& output) {
+  plan.has_spatial() ? PrintSpatial(plan, output) : PrintLambda(plan, output);
   TextTable limits{{"limit", "length_mm", "share_%"}, {}};
   for (const v1::BindingLimit& limit : plan.binding_limits()) {
     limits.rows.push_back({limit.limit(), Fixed(limit.length_mm(), 1), Fixed(limit.share() * 100, 1)});
@@ -187,7 +248,7 @@ absl::Status CheckInSteps(const ProgramOptions& options, const Connections& conn
     output.Text(fmt::format("{:<9} {}", step.step(), refused ? "refused" : "passed"),
                 refused ? Tone::kBad : Tone::kGood);
     PrintFaults(step.faults(), output);
-    if (step.step() == "ACCURACY" && step.has_plan()) {
+    if (step.has_plan() && (step.step() == "ACCURACY" || step.plan().has_spatial())) {
       PrintSummary(step.plan(), output);
     }
   }
@@ -295,24 +356,27 @@ absl::Status Samples(std::uint64_t plan_id, std::optional<double> step_s, const 
   if (!status.ok()) {
     return status;
   }
-  std::vector<std::string> columns = {"tau_s",
-                                      "s_mm",
-                                      "x_W_mm",
-                                      "y_W_mm",
-                                      "vx_W_mm_per_s",
-                                      "vy_W_mm_per_s",
-                                      "ax_W_mm_per_s2",
-                                      "ay_W_mm_per_s2",
-                                      "actuator_1_mm",
-                                      "actuator_2_mm",
-                                      "actuator_1_mm_per_s",
-                                      "actuator_2_mm_per_s",
-                                      "cutting",
-                                      "source_line"};
-  CsvTable table(columns);
+  const bool spatial = !points.spatial_values.empty();
+  const std::vector<std::string> planar = {"tau_s",
+                                           "s_mm",
+                                           "x_W_mm",
+                                           "y_W_mm",
+                                           "vx_W_mm_per_s",
+                                           "vy_W_mm_per_s",
+                                           "ax_W_mm_per_s2",
+                                           "ay_W_mm_per_s2",
+                                           "actuator_1_mm",
+                                           "actuator_2_mm",
+                                           "actuator_1_mm_per_s",
+                                           "actuator_2_mm_per_s",
+                                           "cutting",
+                                           "source_line"};
+  CsvTable table(spatial ? kSpatialColumns : planar);
+  const std::vector<double>& values = spatial ? points.spatial_values : points.values;
+  const std::size_t stride = spatial ? kSpatialPointStride : kPlanPointStride;
   for (std::size_t i = 0; i < points.cutting.size(); ++i) {
-    const auto first = points.values.begin() + static_cast<std::ptrdiff_t>(i * kPlanPointStride);
-    std::vector<double> row(first, first + kPlanPointStride);
+    const auto first = values.begin() + static_cast<std::ptrdiff_t>(i * stride);
+    std::vector<double> row(first, first + static_cast<std::ptrdiff_t>(stride));
     row.push_back(points.cutting[i]);
     row.push_back(points.source_line[i]);
     table.AddRow(row);
@@ -334,6 +398,7 @@ void AddAdmitVerb(CLI::App& noun, Output& output, const Connections& connections
 struct ExportOptions {
   std::string file;
   FormatOptions format;
+  std::string mechanism = "lambda";
   std::uint64_t plan_id = 0;
   std::optional<double> step_s;
   std::string as;
@@ -357,6 +422,7 @@ absl::Status RunExport(const ExportOptions& options, const Connections& connecti
     }
     request.set_program(program.program());
     request.set_program_format(program.format());
+    request.set_mechanism(MechanismOf(options.mechanism));
     if (program.has_toolpath()) {
       *request.mutable_toolpath() = program.toolpath();
     }
@@ -375,6 +441,7 @@ void AddExportVerb(CLI::App& noun, Output& output, const Connections& connection
   exported->add_option("--step-s", options->step_s, "distance of points in program time; default 0.004");
   exported->add_option("--out", options->out, "file; - is standard output");
   AddFormatOptions(*exported, options->format);
+  AddMechanismOption(*exported, options->mechanism);
   exported->callback([options, &output, &connections] { output.Finish(RunExport(*options, connections)); });
 }
 
@@ -512,12 +579,15 @@ absl::Status ReadPlanPoints(const Connections& connections, std::uint64_t plan_i
   v1::SampleBatch batch;
   while (stream->Read(&batch)) {
     points.values.insert(points.values.end(), batch.values().begin(), batch.values().end());
+    points.spatial_values.insert(points.spatial_values.end(), batch.spatial_values().begin(),
+                                 batch.spatial_values().end());
     points.cutting.insert(points.cutting.end(), batch.cutting().begin(), batch.cutting().end());
     points.source_line.insert(points.source_line.end(), batch.source_line().begin(),
                               batch.source_line().end());
   }
   absl::Status status = connections.Named("trajectory", FromWire(stream->Finish()));
-  if (status.ok() && (points.values.size() != points.cutting.size() * kPlanPointStride ||
+  if (status.ok() && ((points.values.size() != points.cutting.size() * kPlanPointStride &&
+                       points.spatial_values.size() != points.cutting.size() * kSpatialPointStride) ||
                       points.source_line.size() != points.cutting.size())) {
     return Trouble(absl::StatusCode::kInternal, "BAD_SAMPLES",
                    "trajectory's samples do not have the stride that they should");

@@ -15,9 +15,11 @@
 namespace lambdajet::cli {
 
 inline constexpr std::size_t kPlanPointStride = 12;
+inline constexpr std::size_t kSpatialPointStride = 22;
 
 struct PlanPoints {
   std::vector<double> values;
+  std::vector<double> spatial_values;  // of a hexapod's plan instead, stride kSpatialPointStride
   std::vector<std::uint32_t> cutting;
   std::vector<std::uint32_t> source_line;
 };

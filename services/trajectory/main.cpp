@@ -4,14 +4,19 @@
 #include "platform/rpc/rpc_server.hpp"
 #include "platform/telemetry/metrics.hpp"
 #include "trajectory/bus/machine_reader.hpp"
+#include "trajectory/bus/own_hexapod.hpp"
 #include "trajectory/bus/plan_streamer.hpp"
 #include "trajectory/rpc/trajectory_rpc.hpp"
 
 int main(int argc, char** argv) {
   using namespace lambdajet;
   House house("trajectory", "reads part programs, plans them and streams them to the modules");
+  trajectory::OwnHexapod hexapod(house.schema());
   if (const auto exit_code = house.Open(argc, argv)) {
     return *exit_code;
+  }
+  if (const absl::Status read = hexapod.Read(); !read.ok()) {
+    return house.Refuse(read, 78);
   }
   house.Require("machine_description");
   auto machines = trajectory::MachineReader::Open(house.bus(), house.log(),
@@ -25,12 +30,10 @@ int main(int argc, char** argv) {
   }
   trajectory::PlanDesk desk(house.metrics());
   trajectory::TrajectoryRpc rpc(
-      [&machines](std::optional<std::uint32_t> v) {
-        return v ? (*machines)->Version(*v) : (*machines)->active();
-      },
+      [&machines](std::optional<std::uint32_t> version) { return (*machines)->Find(version); },
       {[&streamer](std::shared_ptr<const Plan> plan) { (*streamer)->Start(std::move(plan)); },
        [&streamer](std::uint64_t id) { return (*streamer)->Stop(id); }},
-      desk);
+      desk, hexapod.model());
   house.rpc().Add(rpc, trajectory::v1::TrajectoryService::service_full_name());
   house.OnStop([&desk] { desk.CancelAll(); });
   return house.Run();

@@ -9,6 +9,7 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
 
 #include "absl/status/statusor.h"
 #include "foundation/machine/machine_description.hpp"
@@ -31,6 +32,9 @@ class MachineReader {
 
   std::shared_ptr<const MachineDescription> active() const;                        // null: none yet
   std::shared_ptr<const MachineDescription> Version(std::uint32_t version) const;  // null: not held
+  std::shared_ptr<const MachineDescription> Find(std::optional<std::uint32_t> version) const {
+    return version ? Version(*version) : active();
+  }
 
  private:
   struct Link;

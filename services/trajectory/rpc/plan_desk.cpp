@@ -65,10 +65,8 @@ absl::StatusOr<std::shared_ptr<const PlanRecord>> PlanDesk::Begin(
     plans_failed_.Increment();
     return std::shared_ptr<const PlanRecord>(refused);
   }
-  const auto there =
-      std::find_if(records_.begin(), records_.end(), [id](const auto& r) { return r->id == id; });
-  if (there != records_.end() && (*there)->state != PlanState::kCancelled && !(*there)->cancel) {
-    return std::shared_ptr<const PlanRecord>(*there);
+  if (auto there = There(id)) {
+    return there;
   }
   const auto record = NewRecord(id, std::move(options), std::move(machine));
   record->program = std::move(program.text);
@@ -77,6 +75,15 @@ absl::StatusOr<std::shared_ptr<const PlanRecord>> PlanDesk::Begin(
   }
   Replace(record);
   return std::shared_ptr<const PlanRecord>(record);
+}
+
+// Called with the mutex held.
+std::shared_ptr<const PlanRecord> PlanDesk::There(std::uint64_t id) const {
+  const auto there =
+      std::find_if(records_.begin(), records_.end(), [id](const auto& r) { return r->id == id; });
+  const bool usable =
+      there != records_.end() && (*there)->state != PlanState::kCancelled && !(*there)->cancel;
+  return usable ? *there : nullptr;
 }
 
 void PlanDesk::Work(const std::shared_ptr<PlanRecord>& record) {
@@ -94,6 +101,12 @@ void PlanDesk::Work(const std::shared_ptr<PlanRecord>& record) {
   if (planned->faults.empty() && !record->cancel) {
     record->predicted_95_mm = PredictedBound(*record->machine, *planned, record->cancel);
   }
+  Settle(record, std::move(planned), begin);
+}
+
+void PlanDesk::Settle(const std::shared_ptr<PlanRecord>& record,
+                      std::shared_ptr<const PlannedProgram> planned,
+                      std::chrono::steady_clock::time_point begin) {
   if (record->program.size() > kMostKeptBytes) {
     std::string().swap(record->program);
   }

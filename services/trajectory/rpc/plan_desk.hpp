@@ -6,6 +6,7 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <condition_variable>
 #include <cstdint>
 #include <functional>
@@ -18,6 +19,7 @@
 #include "foundation/machine/machine_description.hpp"
 #include "platform/rpc/work_pool.hpp"
 #include "platform/telemetry/metrics.hpp"
+#include "trajectory/core/spatial_feed/spatial_program.hpp"
 #include "trajectory/core/tolerance/plan_to_tolerance.hpp"
 #include "trajectory/rpc/submitted_program.hpp"
 
@@ -38,6 +40,10 @@ struct PlanRecord {
   std::shared_ptr<const PlannedProgram> planned;
   ToleranceReport tolerance;
   double predicted_95_mm = 0.0;
+  // Of a hexapod's plan: `machine` is null, and `planned` has the faults only.
+  std::shared_ptr<const HexapodModel> hexapod;
+  SpatialOptions spatial_options;
+  std::shared_ptr<const PlannedSpatialProgram> spatial;
 };
 
 class PlanDesk {
@@ -50,6 +56,9 @@ class PlanDesk {
   // A program with faults is a plan that has failed.
   absl::StatusOr<std::shared_ptr<const PlanRecord>> Begin(MadeProgram program, PlanOptions options,
                                                           std::shared_ptr<const MachineDescription> machine);
+  absl::StatusOr<std::shared_ptr<const PlanRecord>> BeginSpatial(std::string program,
+                                                                 const SpatialOptions& options,
+                                                                 std::shared_ptr<const HexapodModel> hexapod);
   std::shared_ptr<const PlanRecord> Find(std::uint64_t id) const;  // null: not known
   std::shared_ptr<const PlanRecord> Cancel(std::uint64_t id);
   // Waits until the plan is no longer running, at most so long; true if it is not.
@@ -62,7 +71,11 @@ class PlanDesk {
   std::shared_ptr<PlanRecord> NewRecord(std::uint64_t id, PlanOptions options,
                                         std::shared_ptr<const MachineDescription> machine);
   void Replace(std::shared_ptr<PlanRecord> record);
+  std::shared_ptr<const PlanRecord> There(std::uint64_t id) const;  // null: none, or one that was cancelled
   void Work(const std::shared_ptr<PlanRecord>& record);
+  void WorkSpatial(const std::shared_ptr<PlanRecord>& record);
+  void Settle(const std::shared_ptr<PlanRecord>& record, std::shared_ptr<const PlannedProgram> planned,
+              std::chrono::steady_clock::time_point begin);
   void GiveUpOldest();
 
   mutable std::mutex mutex_;

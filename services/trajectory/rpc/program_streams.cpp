@@ -56,6 +56,9 @@ void AppendSample(const FullSample& s, std::string& csv) {
 }  // namespace
 
 PartProgram ReadListed(ListedProgram listed) {
+  if (listed.hexapod != nullptr) {
+    return ReadSpatialProgram(listed.program.text, listed.hexapod->motion, listed.program.notation);
+  }
   MadeProgram made = MakeProgram(std::move(listed.program), listed.machine.get());
   if (!made.faults.empty()) {
     PartProgram refused;
@@ -108,12 +111,13 @@ Source<v1::ExportPiece> CanonicalPieces(ListedProgram program) {
   };
 }
 
-absl::StatusOr<std::string> Written(const PartProgram& read, v1::ExportRequest::Format format) {
+absl::StatusOr<std::string> Written(const PartProgram& read, v1::ExportRequest::Format format, bool hexapod) {
   if (!read.faults.empty()) {
     return FaultStatus(read.faults.front());
   }
   if (format == v1::ExportRequest::FORMAT_CLDATA) {
-    CldataText cldata = WriteCldata(read.operations, "exported by lambdajet");
+    CldataText cldata = WriteCldata(read.operations, "exported by lambdajet", {},
+                                    hexapod ? ToolAngles::kRollPitch : ToolAngles::kRotaryHead);
     return cldata.faults.empty() ? absl::StatusOr<std::string>(std::move(cldata.text))
                                  : FaultStatus(cldata.faults.front());
   }
@@ -137,7 +141,8 @@ Source<v1::ExportPiece> ProgramPieces(ListedProgram program, v1::ExportRequest::
   return [format, writing = std::make_shared<Writing>(Writing{std::move(program), std::nullopt})](
              v1::ExportPiece& piece) -> absl::StatusOr<bool> {
     if (!writing->text) {
-      auto text = Written(ReadListed(std::move(writing->listed)), format);
+      const bool hexapod = writing->listed.hexapod != nullptr;
+      auto text = Written(ReadListed(std::move(writing->listed)), format, hexapod);
       if (!text.ok()) {
         return text.status();
       }

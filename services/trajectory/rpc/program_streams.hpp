@@ -19,6 +19,7 @@ using Source = std::function<absl::StatusOr<bool>(Message&)>;
 struct ListedProgram {
   SubmittedProgram program;
   std::shared_ptr<const MachineDescription> machine;
+  std::shared_ptr<const HexapodModel> hexapod;  // set: the program is one of its
 };
 
 Source<v1::OperationBatch> OperationBatches(ListedProgram program);

@@ -9,6 +9,8 @@
 #include "platform/rpc/streams.hpp"
 #include "trajectory/rpc/admission.hpp"
 #include "trajectory/rpc/program_streams.hpp"
+#include "trajectory/rpc/spatial_admission.hpp"
+#include "trajectory/rpc/spatial_wire.hpp"
 #include "trajectory/rpc/wire.hpp"
 
 namespace lambdajet::trajectory {
@@ -36,10 +38,12 @@ std::uint64_t FromToken(const std::string& token) {
 
 }  // namespace
 
-TrajectoryRpc::TrajectoryRpc(FindMachine find_machine, Streaming streaming, PlanDesk& desk)
+TrajectoryRpc::TrajectoryRpc(FindMachine find_machine, Streaming streaming, PlanDesk& desk,
+                             std::shared_ptr<const HexapodModel> hexapod)
     : find_machine_(std::move(find_machine)),
       streaming_(std::move(streaming)),
       desk_(desk),
+      hexapod_(std::move(hexapod)),
       pool_(kThreads, kMostWaiting),
       admissions_(kThreads, kMostWaiting) {}
 
@@ -84,6 +88,11 @@ absl::StatusOr<TrajectoryRpc::Asked> TrajectoryRpc::FromRequest(const Request& r
   if (!program.ok()) {
     return program.status();
   }
+  auto hexapod = HexapodFor(request.options().mechanism(), hexapod_);
+  if (!hexapod.ok() || *hexapod != nullptr) {
+    return hexapod.ok() ? ForHexapod(std::move(*program), request.options(), std::move(*hexapod))
+                        : hexapod.status();
+  }
   auto options = FromWire(request.options());
   if (!options.ok()) {
     return options.status();
@@ -92,7 +101,20 @@ absl::StatusOr<TrajectoryRpc::Asked> TrajectoryRpc::FromRequest(const Request& r
   if (!machine.ok()) {
     return machine.status();
   }
-  return Asked{std::move(*program), std::move(*options), std::move(*machine)};
+  return Asked{std::move(*program), std::move(*options), std::move(*machine), nullptr, {}};
+}
+
+absl::StatusOr<TrajectoryRpc::Asked> TrajectoryRpc::ForHexapod(SubmittedProgram program,
+                                                               const v1::PlanOptions& options,
+                                                               std::shared_ptr<const HexapodModel> hexapod) {
+  if (program.drawing) {
+    return DrawingForHexapod();
+  }
+  auto spatial = SpatialFromWire(options, program.notation);
+  if (!spatial.ok()) {
+    return spatial.status();
+  }
+  return Asked{std::move(program), {}, nullptr, std::move(hexapod), *spatial};
 }
 
 absl::Status TrajectoryRpc::Admit(const v1::AdmitProgramRequest& request,
@@ -100,6 +122,11 @@ absl::Status TrajectoryRpc::Admit(const v1::AdmitProgramRequest& request,
   auto asked = FromRequest(request);
   if (!asked.ok()) {
     return asked.status();
+  }
+  if (asked->hexapod != nullptr) {
+    ToWire(AdmitSpatialProgram(asked->program.text, *asked->hexapod, asked->spatial), *asked->hexapod,
+           response);
+    return absl::OkStatus();
   }
   const MadeProgram program = MakeProgram(std::move(asked->program), asked->machine.get());
   ToWire(AdmitMade(program, *asked->machine, asked->options), *asked->machine, response);
@@ -119,8 +146,10 @@ absl::Status TrajectoryRpc::BeginPlan(const v1::PlanProgramRequest& request,
   if (!asked.ok()) {
     return asked.status();
   }
-  MadeProgram program = MakeProgram(std::move(asked->program), asked->machine.get());
-  const auto record = desk_.Begin(std::move(program), std::move(asked->options), asked->machine);
+  const auto record = asked->hexapod != nullptr
+                          ? desk_.BeginSpatial(std::move(asked->program.text), asked->spatial, asked->hexapod)
+                          : desk_.Begin(MakeProgram(std::move(asked->program), asked->machine.get()),
+                                        std::move(asked->options), asked->machine);
   if (!record.ok()) {
     return record.status();
   }
@@ -226,15 +255,18 @@ grpc::ServerWriteReactor<v1::SampleBatch>* TrajectoryRpc::StreamSamples(
   if (!found.ok()) {
     return RefuseStream<v1::SampleBatch>(found.status());
   }
-  const std::shared_ptr<const PlannedProgram> planned = (*found)->planned;
-  const auto count = static_cast<std::int64_t>(std::floor(planned->plan.duration_s / step_s + 1e-9)) + 1;
-  return NewPullStream<v1::SampleBatch>([planned, step_s, count, next = std::int64_t{0}](
+  const double duration_s =
+      (*found)->spatial ? (*found)->spatial->plan.duration_s : (*found)->planned->plan.duration_s;
+  const auto count = static_cast<std::int64_t>(std::floor(duration_s / step_s + 1e-9)) + 1;
+  return NewPullStream<v1::SampleBatch>([record = *found, step_s, count, next = std::int64_t{0}](
                                             v1::SampleBatch& batch) mutable -> absl::StatusOr<bool> {
     if (next >= count) {
       return false;
     }
     for (int i = 0; i < kPointsPerBatch && next < count; ++i, ++next) {
-      AddPoint(*planned, static_cast<double>(next) * step_s, batch);
+      const double tau_s = static_cast<double>(next) * step_s;
+      record->spatial ? AddSpatialPoint(*record->spatial, tau_s, batch)
+                      : AddPoint(*record->planned, tau_s, batch);
     }
     return true;
   });
@@ -247,7 +279,11 @@ absl::StatusOr<ListedProgram> TrajectoryRpc::ListedOf(const Wire& wire) const {
   if (!program.ok()) {
     return program.status();
   }
-  return ListedProgram{std::move(*program), find_machine_(std::nullopt)};
+  auto hexapod = HexapodFor(wire.mechanism(), hexapod_);
+  if (!hexapod.ok() || (*hexapod != nullptr && program->drawing)) {
+    return hexapod.ok() ? DrawingForHexapod() : hexapod.status();
+  }
+  return ListedProgram{std::move(*program), find_machine_(std::nullopt), std::move(*hexapod)};
 }
 
 grpc::ServerUnaryReactor* TrajectoryRpc::ListOperations(grpc::CallbackServerContext* context,
@@ -287,9 +323,16 @@ grpc::ServerWriteReactor<v1::AdmissionStep>* TrajectoryRpc::AdmitProgramInSteps(
   if (!asked.ok()) {
     return RefuseStream<v1::AdmissionStep>(asked.status());
   }
+  return asked->hexapod != nullptr
+             ? RunInSteps(std::make_shared<SpatialAdmissionInSteps>(
+                   std::move(asked->program.text), asked->spatial, asked->hexapod, desk_, closing_))
+             : RunInSteps(std::make_shared<AdmissionInSteps>(std::move(asked->program), asked->options,
+                                                             asked->machine, desk_, closing_));
+}
+
+template <typename Admission>
+grpc::ServerWriteReactor<v1::AdmissionStep>* TrajectoryRpc::RunInSteps(std::shared_ptr<Admission> admission) {
   auto stream = PushStream<v1::AdmissionStep>::New(kMostStepsWaiting);
-  auto admission = std::make_shared<AdmissionInSteps>(std::move(asked->program), asked->options,
-                                                      asked->machine, desk_, closing_);
   const absl::Status queued = admissions_.Submit([stream, admission] {
     stream->Finish(Guarded([&] {
       return admission->Run([&stream](v1::AdmissionStep step) { return stream->Push(std::move(step)); });
@@ -313,8 +356,14 @@ absl::StatusOr<ListedProgram> TrajectoryRpc::ExportedProgram(const v1::ExportReq
   if (request.plan_id() == 0) {
     auto program =
         FromWire(request.program(), request.program_format(), request.has_toolpath(), request.toolpath());
-    return program.ok() ? absl::StatusOr<ListedProgram>({std::move(*program), find_machine_(std::nullopt)})
-                        : program.status();
+    auto hexapod = HexapodFor(request.mechanism(), hexapod_);
+    if (!program.ok() || !hexapod.ok()) {
+      return program.ok() ? hexapod.status() : program.status();
+    }
+    if (*hexapod != nullptr && program->drawing) {
+      return DrawingForHexapod();
+    }
+    return ListedProgram{std::move(*program), find_machine_(std::nullopt), std::move(*hexapod)};
   }
   const auto record = DonePlan(request.plan_id());
   if (!record.ok()) {
@@ -325,7 +374,9 @@ absl::StatusOr<ListedProgram> TrajectoryRpc::ExportedProgram(const v1::ExportReq
                    "the program of this plan is larger than " + std::to_string(PlanDesk::kMostKeptBytes) +
                        " bytes and is not kept; send it as `program`");
   }
-  return ListedProgram{{(*record)->program, (*record)->options.notation, std::nullopt}, (*record)->machine};
+  return ListedProgram{{(*record)->program, (*record)->options.notation, std::nullopt},
+                       (*record)->machine,
+                       (*record)->hexapod};
 }
 
 grpc::ServerWriteReactor<v1::ExportPiece>* TrajectoryRpc::Export(grpc::CallbackServerContext* context,
@@ -348,8 +399,11 @@ grpc::ServerWriteReactor<v1::ExportPiece>* TrajectoryRpc::Export(grpc::CallbackS
                        : RefuseStream<v1::ExportPiece>(listed.status());
   }
   const auto found = DonePlan(request->plan_id());
-  return found.ok() ? NewPullStream<v1::ExportPiece>(SamplePieces((*found)->planned, step_s))
-                    : RefuseStream<v1::ExportPiece>(found.status());
+  if (!found.ok()) {
+    return RefuseStream<v1::ExportPiece>(found.status());
+  }
+  return NewPullStream<v1::ExportPiece>((*found)->spatial ? SpatialSamplePieces((*found)->spatial, step_s)
+                                                          : SamplePieces((*found)->planned, step_s));
 }
 
 grpc::ServerUnaryReactor* TrajectoryRpc::StartStreaming(grpc::CallbackServerContext* context,
@@ -359,6 +413,11 @@ grpc::ServerUnaryReactor* TrajectoryRpc::StartStreaming(grpc::CallbackServerCont
     const auto record = DonePlan(request->plan_id());
     if (!record.ok()) {
       return record.status();
+    }
+    if ((*record)->spatial != nullptr) {
+      return Trouble(absl::StatusCode::kFailedPrecondition, "MECHANISM_NOT_PLAYED",
+                     "the modules play plans of the open-base machine; plan " +
+                         std::to_string((*record)->id) + " is a hexapod's, see StreamSamples");
     }
     desk_.KeepFor((*record)->id);
     streaming_.start(std::shared_ptr<const Plan>((*record)->planned, &(*record)->planned->plan));

@@ -31,7 +31,9 @@ struct Streaming {
 class TrajectoryRpc final : public v1::TrajectoryService::CallbackService {
  public:
   ~TrajectoryRpc() override;
-  TrajectoryRpc(FindMachine find_machine, Streaming streaming, PlanDesk& desk);
+  // `hexapod`: planned for where a request names it; null: none.
+  TrajectoryRpc(FindMachine find_machine, Streaming streaming, PlanDesk& desk,
+                std::shared_ptr<const HexapodModel> hexapod = nullptr);
 
   grpc::ServerUnaryReactor* AdmitProgram(grpc::CallbackServerContext* context,
                                          const v1::AdmitProgramRequest* request,
@@ -72,12 +74,18 @@ class TrajectoryRpc final : public v1::TrajectoryService::CallbackService {
     SubmittedProgram program;
     PlanOptions options;
     std::shared_ptr<const MachineDescription> machine;
+    std::shared_ptr<const HexapodModel> hexapod;  // set: it is meant, with `spatial`
+    SpatialOptions spatial;
   };
 
   template <typename Request>
   absl::StatusOr<Asked> FromRequest(const Request& request) const;
   template <typename Wire>
   absl::StatusOr<ListedProgram> ListedOf(const Wire& wire) const;
+  static absl::StatusOr<Asked> ForHexapod(SubmittedProgram program, const v1::PlanOptions& options,
+                                          std::shared_ptr<const HexapodModel> hexapod);
+  template <typename Admission>
+  grpc::ServerWriteReactor<v1::AdmissionStep>* RunInSteps(std::shared_ptr<Admission> admission);
   absl::StatusOr<ListedProgram> ExportedProgram(const v1::ExportRequest& request) const;
   absl::StatusOr<std::shared_ptr<const MachineDescription>> MachineFor(const v1::PlanOptions& options) const;
   absl::Status Admit(const v1::AdmitProgramRequest& request, v1::AdmitProgramResponse& response) const;
@@ -87,6 +95,7 @@ class TrajectoryRpc final : public v1::TrajectoryService::CallbackService {
   FindMachine find_machine_;
   Streaming streaming_;
   PlanDesk& desk_;
+  std::shared_ptr<const HexapodModel> hexapod_;
   PlanWatch watch_;
   WorkPool pool_;
   std::atomic<bool> closing_ = false;

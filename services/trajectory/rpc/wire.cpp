@@ -2,6 +2,7 @@
 
 #include "platform/rpc/argument_checks.hpp"
 #include "trajectory/core/feed/plan_samples.hpp"
+#include "trajectory/rpc/spatial_wire.hpp"
 
 namespace lambdajet::trajectory {
 namespace {
@@ -129,8 +130,6 @@ void ToWire(const PlanRecord& record, type::v1::Operation& wire) {
   }
 }
 
-namespace {
-
 void ToWire(const SlowStretch& slow, v1::SlowStretch& wire) {
   wire.set_from_s_mm(slow.from_s_mm);
   wire.set_to_s_mm(slow.to_s_mm);
@@ -139,6 +138,8 @@ void ToWire(const SlowStretch& slow, v1::SlowStretch& wire) {
   wire.set_programmed_mm_per_s(slow.programmed_mm_per_s);
   wire.set_lowest_mm_per_s(slow.lowest_mm_per_s);
 }
+
+namespace {
 
 void ToWire(const HeldTolerance& held, v1::HeldTolerance& wire) {
   wire.set_contour(held.contour);
@@ -157,6 +158,9 @@ void ToWire(const HeldTolerance& held, v1::HeldTolerance& wire) {
 void ToWire(const PlanRecord& record, v1::PlanSummary& wire) {
   const PlannedProgram& p = *record.planned;
   wire.set_plan_id(record.id);
+  if (record.spatial != nullptr) {
+    return ToWire(*record.spatial, *record.hexapod, wire);
+  }
   ToWire(*record.machine, *wire.mutable_model_version());
   wire.set_compensated(p.plan.compensated);
   wire.set_duration_s(p.plan.duration_s);
