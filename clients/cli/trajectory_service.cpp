@@ -212,8 +212,12 @@ absl::Status Check(const ProgramOptions& options, const Connections& connections
   }
   PrintJson(response, output);
   PrintFaults(response.faults(), output);
+  const bool hexapod = options.mechanism == "hexapod";
   output.Text(
-      response.admitted()
+      response.admitted() && hexapod
+          ? fmt::format("admitted: {:.1f} mm of feed moves, {:.1f} mm idle (turns counted as their shift)",
+                        response.cutting_length_mm(), response.idle_length_mm())
+      : response.admitted()
           ? fmt::format("admitted: {:.1f} mm with the jet on, {:.1f} mm off, {} pierces, machine version {}",
                         response.cutting_length_mm(), response.idle_length_mm(), response.pierces(),
                         response.model_version().version())
@@ -292,7 +296,8 @@ absl::Status List(const Connections& connections, Output& output) {
     for (const v1::PlanSummary& plan : response.plans()) {
       table.rows.push_back({std::to_string(plan.plan_id()), std::to_string(plan.model_version().version()),
                             Fixed(plan.duration_s(), 2), Fixed(plan.cutting_length_mm(), 1),
-                            plan.compensated() ? "yes" : "no", Fixed(plan.predicted_95_mm(), 4)});
+                            plan.compensated() ? "yes" : "no",
+                            plan.has_spatial() ? "" : Fixed(plan.predicted_95_mm(), 4)});
     }
   } while (!response.next_page_token().empty());
   output.Table(table);

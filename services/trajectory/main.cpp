@@ -1,8 +1,6 @@
-#include "lambdajet/trajectory/v1/trajectory.grpc.pb.h"
 #include "platform/bus/participant.hpp"
 #include "platform/house/house.hpp"
 #include "platform/rpc/rpc_server.hpp"
-#include "platform/telemetry/metrics.hpp"
 #include "trajectory/bus/machine_reader.hpp"
 #include "trajectory/bus/own_hexapod.hpp"
 #include "trajectory/bus/plan_streamer.hpp"
@@ -18,7 +16,9 @@ int main(int argc, char** argv) {
   if (const absl::Status read = hexapod.Read(); !read.ok()) {
     return house.Refuse(read, 78);
   }
-  house.Require("machine_description");
+  if (hexapod.model() == nullptr) {
+    house.Require("machine_description");
+  }
   auto machines = trajectory::MachineReader::Open(house.bus(), house.log(),
                                                   [&house] { house.Met("machine_description"); });
   if (!machines.ok()) {

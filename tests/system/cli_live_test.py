@@ -2,6 +2,7 @@
 value (or one a line) on standard output, nothing there when the verb fails. One short run over two marks is really driven."""
 
 import json
+import os
 import pathlib
 import sys
 import unittest
@@ -11,6 +12,8 @@ import stages
 from lambdajet_shell import DONE, REFUSED, UNREACHABLE, WRONG_STATE, Lambdajet
 
 BUILD = pathlib.Path(sys.argv.pop(1))
+HOLES = under_test.SOURCE / "deploy" / "parts" / "tilted_holes" / "tilted_holes.ngc"
+os.environ["LAMBDAJET_HEXAPOD_FILE"] = str(under_test.SOURCE / "deploy" / "config" / "hexapod.yaml")
 DRAWING = under_test.SOURCE / "deploy" / "parts" / "bracket.drawing.yaml"
 
 
@@ -154,6 +157,28 @@ class EveryVerb(unittest.TestCase):
         self.assertEqual(steps[-1]["step"], "ACCURACY")
         run("trajectory", "show", 7, code=REFUSED)
         run("trajectory", "export", "--plan", 7, code=REFUSED)
+
+    def test_trajectory_of_a_hexapod(self):
+        ask, run = self.lambdajet.ask, self.lambdajet.run
+        hexapod = ("--mechanism", "hexapod")
+        people = run("trajectory", "admit", HOLES, *hexapod)
+        for step in ("PARSE", "PLACE", "REACH", "LIMITS", "TIME"):
+            self.assertRegex(people, f"{step} +passed")
+        self.assertIn("singular margin", people)
+        people, planned = ask("trajectory", "ask-plan", HOLES, *hexapod)
+        plan = planned["summary"]["plan_id"]
+        self.assertGreater(planned["summary"]["spatial"]["longest_strut_mm"], 1000)
+        self.assertTrue(ask("trajectory", "ask-check", HOLES, *hexapod)[1]["admitted"])
+        samples = run("trajectory", "samples", plan, "--step-s", 0.05)
+        self.assertTrue(samples.startswith("tau_s,s_mm,x_W_mm,y_W_mm,z_W_mm,a_rad,"))
+        exported = run("trajectory", "export", "--plan", plan, "--step-s", 0.05)
+        self.assertEqual(len(exported.splitlines()), len(samples.splitlines()))
+        self.assertIn("b_rad=", run("trajectory", "export", "--program", HOLES, *hexapod))
+        cldata = self.folder / "holes.cldata"
+        cldata.write_text(run("trajectory", "export", "--plan", plan, "--as", "cldata"))
+        again = self.lambdajet.ask_json("trajectory", "ask-plan", cldata, *hexapod)
+        self.assertAlmostEqual(again["summary"]["duration_s"], planned["summary"]["duration_s"], places=6)
+        run("trajectory", "ask-plan", HOLES, *hexapod, "--tolerance-mm", 1, code=REFUSED)
 
     def test_inspection(self):
         ask, run, plan = self.lambdajet.ask, self.lambdajet.run, self.plan

@@ -6,7 +6,8 @@ namespace lambdajet::trajectory {
 
 OwnHexapod::OwnHexapod(ConfigSchema& schema) {
   schema.AddPath("hexapod_file", &file_,
-                 "a hexapod to plan for as well, where a request names it; empty: none");
+                 "a hexapod to plan for as well, where a request names it; alone where no machine "
+                 "description comes; empty: none");
 }
 
 absl::Status OwnHexapod::Read() {
