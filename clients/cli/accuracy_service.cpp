@@ -9,8 +9,8 @@
 namespace lambdajet::cli {
 namespace {
 
-namespace v1 = accuracy::v1;
-using v1::AccuracyService;
+namespace accuracy_v1 = accuracy::v1;
+using accuracy_v1::AccuracyService;
 
 constexpr std::size_t kPredictionStride = 8;  // of a plan's point: time, s, place, speed, acceleration
 
@@ -21,7 +21,7 @@ struct PredictOptions {
   std::optional<std::uint64_t> seed;
 };
 
-void PrintPrediction(const v1::PredictContourResponse& prediction, Output& output) {
+void PrintPrediction(const accuracy_v1::PredictContourResponse& prediction, Output& output) {
   if (prediction.reason() != "PREDICTED") {
     output.Text("no bound: " + prediction.reason(), Tone::kWarning);
     return;
@@ -32,13 +32,13 @@ void PrintPrediction(const v1::PredictContourResponse& prediction, Output& outpu
                   prediction.predicted_95_mm(), prediction.predicted_95_linear_mm(),
                   prediction.expected_95_mm(), prediction.model_version().version()));
   TextTable budget{{"source", "contribution_95_mm", "share_%"}, {}};
-  for (const v1::SourceShare& source : prediction.budget()) {
+  for (const accuracy_v1::SourceShare& source : prediction.budget()) {
     budget.rows.push_back(
         {source.source(), Fixed(source.contribution_95_mm(), 4), Fixed(source.share() * 100, 1)});
   }
   output.Table(budget);
   TextTable worst{{"line", "x_W_mm", "y_W_mm", "bound_95_mm", "source"}, {}};
-  for (const v1::WorstPlace& place : prediction.worst()) {
+  for (const accuracy_v1::WorstPlace& place : prediction.worst()) {
     worst.rows.push_back({std::to_string(place.source_line()), Fixed(place.x_w_mm(), 2),
                           Fixed(place.y_w_mm(), 2), Fixed(place.bound_95_mm(), 4), place.source()});
   }
@@ -52,7 +52,7 @@ absl::Status Predict(const PredictOptions& options, const Connections& connectio
   if (!status.ok()) {
     return status;
   }
-  v1::PredictContourRequest request;
+  accuracy_v1::PredictContourRequest request;
   for (std::size_t i = 0; i < points.cutting.size(); ++i) {
     for (std::size_t j = 0; j < kPredictionStride; ++j) {
       request.add_values(points.values[i * kPlanPointStride + j]);
@@ -67,7 +67,7 @@ absl::Status Predict(const PredictOptions& options, const Connections& connectio
   if (options.seed) {
     request.set_seed(*options.seed);
   }
-  v1::PredictContourResponse response;
+  accuracy_v1::PredictContourResponse response;
   status =
       connections.Ask<AccuracyService>("accuracy", &AccuracyService::Stub::PredictContour, request, response);
   if (status.ok()) {
@@ -78,14 +78,14 @@ absl::Status Predict(const PredictOptions& options, const Connections& connectio
 
 absl::Status Map(std::optional<std::uint32_t> columns, std::optional<std::uint32_t> rows,
                  const std::string& out, const Connections& connections, Output& output) {
-  v1::ErrorMapRequest request;
+  accuracy_v1::ErrorMapRequest request;
   if (columns) {
     request.set_columns(*columns);
   }
   if (rows) {
     request.set_rows(*rows);
   }
-  v1::ErrorMapResponse response;
+  accuracy_v1::ErrorMapResponse response;
   const absl::Status status =
       connections.Ask<AccuracyService>("accuracy", &AccuracyService::Stub::ErrorMap, request, response);
   if (!status.ok()) {
@@ -124,7 +124,7 @@ void AddAccuracyServiceVerbs(CLI::App& noun, Output& output, const Connections& 
   map->callback(
       [=, &output, &connections] { output.Finish(Map(*columns, *rows, *out, connections, output)); });
 
-  auto request = std::make_shared<v1::BudgetRequest>();
+  auto request = std::make_shared<accuracy_v1::BudgetRequest>();
   auto shifts = std::make_shared<std::vector<double>>();
   auto numbers = std::make_shared<std::vector<double>>(6, 0.0);
   CLI::App* budget = AddServiceVerb(noun, "budget", "equations (1) and (2) for given shares");
@@ -142,7 +142,7 @@ void AddAccuracyServiceVerbs(CLI::App& noun, Output& output, const Connections& 
     request->set_radius_b_mm((*numbers)[3]);
     request->set_drive_mm((*numbers)[4]);
     request->set_jet_mm((*numbers)[5]);
-    v1::BudgetResponse response;
+    accuracy_v1::BudgetResponse response;
     const absl::Status status =
         connections.Ask<AccuracyService>("accuracy", &AccuracyService::Stub::Budget, *request, response);
     if (status.ok()) {

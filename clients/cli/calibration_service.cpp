@@ -13,20 +13,21 @@
 namespace lambdajet::cli {
 namespace {
 
-namespace v1 = calibration::v1;
-using v1::CalibrationService;
+namespace calibration_v1 = calibration::v1;
+using calibration_v1::CalibrationService;
 
 constexpr auto kPoll = std::chrono::milliseconds(100);
-constexpr char kService[] = "calibration";
+constexpr char kCalibrationService[] = "calibration";
 
 std::string Author() {
   const char* user = std::getenv("USER");
   return user == nullptr || user[0] == '\0' ? "lambdajet" : user;
 }
 
-void PrintChanges(const google::protobuf::RepeatedPtrField<v1::ParameterChange>& changes, Output& output) {
+void PrintChanges(const google::protobuf::RepeatedPtrField<calibration_v1::ParameterChange>& changes,
+                  Output& output) {
   TextTable table{{"parameter", "unit", "before", "sigma", "after", "sigma", "change"}, {}};
-  for (const v1::ParameterChange& change : changes) {
+  for (const calibration_v1::ParameterChange& change : changes) {
     table.rows.push_back({change.name(), change.unit(), Fixed(change.before(), 6),
                           Fixed(change.before_sigma(), 6), Fixed(change.after(), 6),
                           Fixed(change.after_sigma(), 6), Fixed(change.after() - change.before(), 6)});
@@ -39,11 +40,11 @@ absl::Status WriteProgram(const std::string& out, const std::string& program, co
   return output.json() && out == "-" ? absl::OkStatus() : WriteTextFile(out, program);
 }
 
-absl::Status PlanRun(const v1::PlanMeasuringRunRequest& request, const std::string& out,
+absl::Status PlanRun(const calibration_v1::PlanMeasuringRunRequest& request, const std::string& out,
                      const Connections& connections, Output& output) {
-  v1::PlanMeasuringRunResponse response;
+  calibration_v1::PlanMeasuringRunResponse response;
   absl::Status status = connections.Ask<CalibrationService>(
-      kService, &CalibrationService::Stub::PlanMeasuringRun, request, response);
+      kCalibrationService, &CalibrationService::Stub::PlanMeasuringRun, request, response);
   if (!status.ok()) {
     return status;
   }
@@ -55,24 +56,24 @@ absl::Status PlanRun(const v1::PlanMeasuringRunRequest& request, const std::stri
 absl::Status Verify(std::uint64_t plan_id, const std::string& program, std::optional<std::uint32_t> looks,
                     const Connections& connections, Output& output) {
   if (!program.empty()) {
-    v1::PlanVerificationRequest request;
+    calibration_v1::PlanVerificationRequest request;
     if (looks) {
       request.set_looks(*looks);
     }
-    v1::PlanVerificationResponse response;
+    calibration_v1::PlanVerificationResponse response;
     const absl::Status status = connections.Ask<CalibrationService>(
-        kService, &CalibrationService::Stub::PlanVerification, request, response);
+        kCalibrationService, &CalibrationService::Stub::PlanVerification, request, response);
     if (!status.ok()) {
       return status;
     }
     PrintJson(response, output);
     return WriteProgram(program, response.program(), output);
   }
-  v1::VerifyBaseRequest request;
+  calibration_v1::VerifyBaseRequest request;
   request.set_plan_id(plan_id);
-  v1::VerifyBaseResponse response;
-  const absl::Status status =
-      connections.Ask<CalibrationService>(kService, &CalibrationService::Stub::VerifyBase, request, response);
+  calibration_v1::VerifyBaseResponse response;
+  const absl::Status status = connections.Ask<CalibrationService>(
+      kCalibrationService, &CalibrationService::Stub::VerifyBase, request, response);
   if (!status.ok()) {
     return status;
   }
@@ -91,11 +92,11 @@ absl::Status Verify(std::uint64_t plan_id, const std::string& program, std::opti
 
 absl::Status Runs(std::uint64_t plan_id, const Connections& connections, Output& output) {
   if (plan_id != 0) {
-    v1::GetRunRequest request;
+    calibration_v1::GetRunRequest request;
     request.set_plan_id(plan_id);
-    v1::GetRunResponse response;
-    const absl::Status status =
-        connections.Ask<CalibrationService>(kService, &CalibrationService::Stub::GetRun, request, response);
+    calibration_v1::GetRunResponse response;
+    const absl::Status status = connections.Ask<CalibrationService>(
+        kCalibrationService, &CalibrationService::Stub::GetRun, request, response);
     if (!status.ok()) {
       return status;
     }
@@ -105,7 +106,7 @@ absl::Status Runs(std::uint64_t plan_id, const Connections& connections, Output&
     }
     CsvTable table(
         {"mark", "exposure_ns", "seen", "x_C_mm", "y_C_mm", "gate", "actuator_1_mm", "actuator_2_mm"});
-    for (const v1::Look& look : response.looks()) {
+    for (const calibration_v1::Look& look : response.looks()) {
       const auto actuator = [&](int i) {
         return i < look.actuator_position_mm_size() ? Shortest(look.actuator_position_mm(i)) : "";
       };
@@ -116,17 +117,17 @@ absl::Status Runs(std::uint64_t plan_id, const Connections& connections, Output&
     }
     return WriteCsv("-", table);
   }
-  v1::ListRunsRequest request;
+  calibration_v1::ListRunsRequest request;
   request.set_page_size(100);
-  v1::ListRunsResponse response;
-  const absl::Status status =
-      connections.Ask<CalibrationService>(kService, &CalibrationService::Stub::ListRuns, request, response);
+  calibration_v1::ListRunsResponse response;
+  const absl::Status status = connections.Ask<CalibrationService>(
+      kCalibrationService, &CalibrationService::Stub::ListRuns, request, response);
   if (!status.ok()) {
     return status;
   }
   PrintJson(response, output);
   TextTable table{{"plan", "looks", "unseen"}, {}};
-  for (const v1::Run& run : response.runs()) {
+  for (const calibration_v1::Run& run : response.runs()) {
     table.rows.push_back(
         {std::to_string(run.plan_id()), std::to_string(run.looks()), std::to_string(run.unseen())});
   }
@@ -134,7 +135,7 @@ absl::Status Runs(std::uint64_t plan_id, const Connections& connections, Output&
   return status;
 }
 
-void PrintResult(const v1::IdentificationResult& result, Output& output) {
+void PrintResult(const calibration_v1::IdentificationResult& result, Output& output) {
   if (output.json()) {
     return PrintJson(result, output);
   }
@@ -157,12 +158,12 @@ void PrintResult(const v1::IdentificationResult& result, Output& output) {
 
 absl::Status Activate(std::uint32_t version, const std::string& author, const Connections& connections,
                       Output& output) {
-  v1::ActivateVersionRequest request;
+  calibration_v1::ActivateVersionRequest request;
   request.set_version(version);
   request.set_author(author.empty() ? Author() : author);
-  v1::ActivateVersionResponse response;
+  calibration_v1::ActivateVersionResponse response;
   const absl::Status status = connections.Ask<CalibrationService>(
-      kService, &CalibrationService::Stub::ActivateVersion, request, response);
+      kCalibrationService, &CalibrationService::Stub::ActivateVersion, request, response);
   if (status.ok()) {
     PrintJson(response, output);
     output.Text(fmt::format("active: version {} {}", response.model_version().version(),
@@ -174,18 +175,18 @@ absl::Status Activate(std::uint32_t version, const std::string& author, const Co
 
 absl::Status Identify(std::uint64_t plan_id, const std::string& author, bool activate,
                       const Connections& connections, Output& output) {
-  v1::StartIdentificationRequest request;
+  calibration_v1::StartIdentificationRequest request;
   request.set_plan_id(plan_id);
   request.set_author(author.empty() ? Author() : author);
-  v1::StartIdentificationResponse started;
+  calibration_v1::StartIdentificationResponse started;
   absl::Status status = connections.Ask<CalibrationService>(
-      kService, &CalibrationService::Stub::StartIdentification, request, started);
-  v1::GetIdentificationRequest get;
+      kCalibrationService, &CalibrationService::Stub::StartIdentification, request, started);
+  calibration_v1::GetIdentificationRequest get;
   get.set_operation_id(started.operation().id());
   while (status.ok()) {
-    v1::GetIdentificationResponse now;
-    status =
-        connections.Ask<CalibrationService>(kService, &CalibrationService::Stub::GetIdentification, get, now);
+    calibration_v1::GetIdentificationResponse now;
+    status = connections.Ask<CalibrationService>(kCalibrationService,
+                                                 &CalibrationService::Stub::GetIdentification, get, now);
     if (status.ok() && now.operation().state() != type::v1::OPERATION_STATE_RUNNING) {
       output.EndProgress();
       if (!now.has_result()) {
@@ -202,17 +203,17 @@ absl::Status Identify(std::uint64_t plan_id, const std::string& author, bool act
 }
 
 absl::Status Versions(const Connections& connections, Output& output) {
-  v1::ListVersionsRequest request;
+  calibration_v1::ListVersionsRequest request;
   request.set_page_size(100);
-  v1::ListVersionsResponse response;
+  calibration_v1::ListVersionsResponse response;
   const absl::Status status = connections.Ask<CalibrationService>(
-      kService, &CalibrationService::Stub::ListVersions, request, response);
+      kCalibrationService, &CalibrationService::Stub::ListVersions, request, response);
   if (!status.ok()) {
     return status;
   }
   PrintJson(response, output);
   TextTable table{{"version", "active", "parent", "author", "created", "run", "hash"}, {}};
-  for (const v1::Version& version : response.versions()) {
+  for (const calibration_v1::Version& version : response.versions()) {
     table.rows.push_back({std::to_string(version.model_version().version()), version.active() ? "*" : "",
                           std::to_string(version.parent()), version.author(), version.created(),
                           std::to_string(version.run_plan_id()), version.model_version().hash()});
@@ -223,13 +224,13 @@ absl::Status Versions(const Connections& connections, Output& output) {
 
 absl::Status ShowVersion(std::optional<std::uint32_t> version, bool yaml, const Connections& connections,
                          Output& output) {
-  v1::GetVersionRequest request;
+  calibration_v1::GetVersionRequest request;
   if (version) {
     request.set_version(*version);
   }
-  v1::GetVersionResponse response;
-  const absl::Status status =
-      connections.Ask<CalibrationService>(kService, &CalibrationService::Stub::GetVersion, request, response);
+  calibration_v1::GetVersionResponse response;
+  const absl::Status status = connections.Ask<CalibrationService>(
+      kCalibrationService, &CalibrationService::Stub::GetVersion, request, response);
   if (!status.ok()) {
     return status;
   }
@@ -246,12 +247,12 @@ absl::Status ShowVersion(std::optional<std::uint32_t> version, bool yaml, const 
 }
 
 absl::Status Diff(std::uint32_t before, std::uint32_t after, const Connections& connections, Output& output) {
-  v1::DiffVersionsRequest request;
+  calibration_v1::DiffVersionsRequest request;
   request.set_before(before);
   request.set_after(after);
-  v1::DiffVersionsResponse response;
+  calibration_v1::DiffVersionsResponse response;
   const absl::Status status = connections.Ask<CalibrationService>(
-      kService, &CalibrationService::Stub::DiffVersions, request, response);
+      kCalibrationService, &CalibrationService::Stub::DiffVersions, request, response);
   if (status.ok()) {
     PrintJson(response, output);
     PrintChanges(response.parameters(), output);
@@ -260,7 +261,7 @@ absl::Status Diff(std::uint32_t before, std::uint32_t after, const Connections& 
 }
 
 void AddMeasuring(CLI::App& noun, Output& output, const Connections& connections) {
-  auto request = std::make_shared<v1::PlanMeasuringRunRequest>();
+  auto request = std::make_shared<calibration_v1::PlanMeasuringRunRequest>();
   auto looks = std::make_shared<std::optional<std::uint32_t>>();
   auto pierces = std::make_shared<std::optional<std::uint32_t>>();
   auto skip = std::make_shared<bool>(false);

@@ -9,12 +9,12 @@
 namespace lambdajet::cli {
 namespace {
 
-namespace v1 = inspection::v1;
-using v1::InspectionService;
+namespace inspection_v1 = inspection::v1;
+using inspection_v1::InspectionService;
 
-constexpr char kService[] = "inspection";
+constexpr char kInspectionService[] = "inspection";
 
-std::vector<std::string> Row(const v1::FeatureResult& feature) {
+std::vector<std::string> Row(const inspection_v1::FeatureResult& feature) {
   return {feature.name(),
           Fixed(feature.p50_mm(), 4),
           Fixed(feature.p95_mm(), 4),
@@ -32,12 +32,12 @@ absl::Status Compare(std::uint64_t plan_id, const std::string& drawing, const st
   if (!yaml.ok()) {
     return yaml.status();
   }
-  v1::InspectRequest request;
+  inspection_v1::InspectRequest request;
   request.set_plan_id(plan_id);
   request.set_drawing_yaml(*yaml);
-  v1::InspectResponse response;
-  absl::Status status =
-      connections.Ask<InspectionService>(kService, &InspectionService::Stub::Inspect, request, response);
+  inspection_v1::InspectResponse response;
+  absl::Status status = connections.Ask<InspectionService>(
+      kInspectionService, &InspectionService::Stub::Inspect, request, response);
   if (status.ok() && !out.empty()) {
     CsvTable table({"x_W_mm", "y_W_mm", "deviation_mm", "feature"});
     for (int i = 0; i + 4 <= response.deviations_size(); i += 4) {
@@ -56,7 +56,7 @@ absl::Status Compare(std::uint64_t plan_id, const std::string& drawing, const st
   TextTable table{{"feature", "p50_mm", "p95_mm", "max_mm", "mean_mm", "rms_mm", "tolerance_mm",
                    "conforming_%", "not cut"},
                   {Row(response.all())}};
-  for (const v1::FeatureResult& feature : response.features()) {
+  for (const inspection_v1::FeatureResult& feature : response.features()) {
     table.rows.push_back(Row(feature));
   }
   output.Table(table);
@@ -70,24 +70,24 @@ absl::Status Compare(std::uint64_t plan_id, const std::string& drawing, const st
 
 absl::Status Path(std::uint64_t plan_id, const std::string& out, const Connections& connections,
                   Output& output) {
-  const auto channel = connections.Open(kService);
+  const auto channel = connections.Open(kInspectionService);
   if (!channel.ok()) {
     return channel.status();
   }
   InspectionService::Stub stub(*channel);
   grpc::ClientContext context;
   SetDeadline(context, connections.timeout_s());
-  v1::StreamCutPathRequest request;
+  inspection_v1::StreamCutPathRequest request;
   request.set_plan_id(plan_id);
   const auto stream = stub.StreamCutPath(&context, request);
   CsvTable table({"time_s", "x_W_mm", "y_W_mm", "jet_on"});
-  for (v1::CutPathBatch batch; stream->Read(&batch);) {
+  for (inspection_v1::CutPathBatch batch; stream->Read(&batch);) {
     PrintJson(batch, output);
     for (int i = 0; i + 4 <= batch.values_size(); i += 4) {
       table.AddRow(std::vector<double>(batch.values().begin() + i, batch.values().begin() + i + 4));
     }
   }
-  const absl::Status status = connections.Named(kService, FromWire(stream->Finish()));
+  const absl::Status status = connections.Named(kInspectionService, FromWire(stream->Finish()));
   return status.ok() && !(output.json() && out == "-") ? WriteCsv(out, table) : status;
 }
 
@@ -100,12 +100,12 @@ void AddInspectionServiceVerbs(CLI::App& noun, Output& output, const Connections
   begin->add_option("PLAN", *begun, "the plan's id")->required();
   begin->add_option("--further", *further, "further plans of the same job");
   begin->callback([=, &output, &connections] {
-    v1::BeginRecordingRequest request;
+    inspection_v1::BeginRecordingRequest request;
     request.set_plan_id(*begun);
     request.mutable_further_plan_ids()->Add(further->begin(), further->end());
-    v1::BeginRecordingResponse response;
+    inspection_v1::BeginRecordingResponse response;
     const absl::Status status = connections.Ask<InspectionService>(
-        kService, &InspectionService::Stub::BeginRecording, request, response);
+        kInspectionService, &InspectionService::Stub::BeginRecording, request, response);
     if (status.ok()) {
       PrintJson(response, output);
       output.Text(fmt::format("the truth of plan {} is kept from now on", *begun));
@@ -117,11 +117,11 @@ void AddInspectionServiceVerbs(CLI::App& noun, Output& output, const Connections
   CLI::App* end = AddServiceVerb(noun, "end", "stop keeping it");
   end->add_option("PLAN", *ended, "the plan's id")->required();
   end->callback([=, &output, &connections] {
-    v1::EndRecordingRequest request;
+    inspection_v1::EndRecordingRequest request;
     request.set_plan_id(*ended);
-    v1::EndRecordingResponse response;
+    inspection_v1::EndRecordingResponse response;
     const absl::Status status = connections.Ask<InspectionService>(
-        kService, &InspectionService::Stub::EndRecording, request, response);
+        kInspectionService, &InspectionService::Stub::EndRecording, request, response);
     if (status.ok()) {
       PrintJson(response, output);
       output.Text(fmt::format("{} ms of truth kept, {} missing", response.samples(), response.missing()));

@@ -16,11 +16,11 @@
 namespace lambdajet::cli {
 namespace {
 
-namespace v1 = cell::v1;
-using v1::CellService;
+namespace cell_v1 = cell::v1;
+using cell_v1::CellService;
 
-std::string StateName(v1::JobState state) {
-  const std::string name = v1::JobState_Name(state);
+std::string StateName(cell_v1::JobState state) {
+  const std::string name = cell_v1::JobState_Name(state);
   constexpr std::string_view kPrefix = "JOB_STATE_";
   return name.substr(name.rfind(kPrefix, 0) == 0 ? kPrefix.size() : 0);
 }
@@ -32,28 +32,28 @@ std::string FormatWords(type::v1::ProgramFormat format) {
                                                      : "";
 }
 
-Tone ToneOf(v1::JobState state) {
+Tone ToneOf(cell_v1::JobState state) {
   switch (state) {
-    case v1::JOB_STATE_COMPLETED:
+    case cell_v1::JOB_STATE_COMPLETED:
       return Tone::kGood;
-    case v1::JOB_STATE_HELD:
-    case v1::JOB_STATE_INTERRUPTED:
+    case cell_v1::JOB_STATE_HELD:
+    case cell_v1::JOB_STATE_INTERRUPTED:
       return Tone::kWarning;
-    case v1::JOB_STATE_REFUSED:
-    case v1::JOB_STATE_FAILED:
-    case v1::JOB_STATE_CANCELLED:
+    case cell_v1::JOB_STATE_REFUSED:
+    case cell_v1::JOB_STATE_FAILED:
+    case cell_v1::JOB_STATE_CANCELLED:
       return Tone::kBad;
     default:
       return Tone::kPlain;
   }
 }
 
-bool HasEnded(v1::JobState state) {
-  return state == v1::JOB_STATE_COMPLETED || state == v1::JOB_STATE_CANCELLED ||
-         state == v1::JOB_STATE_FAILED || state == v1::JOB_STATE_REFUSED;
+bool HasEnded(cell_v1::JobState state) {
+  return state == cell_v1::JOB_STATE_COMPLETED || state == cell_v1::JOB_STATE_CANCELLED ||
+         state == cell_v1::JOB_STATE_FAILED || state == cell_v1::JOB_STATE_REFUSED;
 }
 
-std::string Line(const v1::Job& job) {
+std::string Line(const cell_v1::Job& job) {
   std::string line = fmt::format("{} {}", job.job_id(), StateName(job.state()));
   if (!job.reason().empty()) {
     line += fmt::format(" {}", job.reason());
@@ -64,7 +64,7 @@ std::string Line(const v1::Job& job) {
   return line;
 }
 
-void PrintJob(const v1::Job& job, Output& output) {
+void PrintJob(const cell_v1::Job& job, Output& output) {
   if (output.json()) {
     return PrintJson(job, output);
   }
@@ -87,27 +87,28 @@ void PrintJob(const v1::Job& job, Output& output) {
 }
 
 // A refused job is an answer, but a script must see it.
-void ExitAs(const v1::Job& job, Output& output) {
-  output.Exit(job.state() == v1::JOB_STATE_REFUSED || job.state() == v1::JOB_STATE_FAILED ? ExitCode::kRefused
-              : job.state() == v1::JOB_STATE_INTERRUPTED ? ExitCode::kPrecondition
-                                                         : ExitCode::kOk);
+void ExitAs(const cell_v1::Job& job, Output& output) {
+  output.Exit(job.state() == cell_v1::JOB_STATE_REFUSED || job.state() == cell_v1::JOB_STATE_FAILED
+                  ? ExitCode::kRefused
+              : job.state() == cell_v1::JOB_STATE_INTERRUPTED ? ExitCode::kPrecondition
+                                                              : ExitCode::kOk);
 }
 
 // Follows jobs until `enough` says so; the stream itself has no deadline.
 absl::Status Watch(const Connections& connections, const std::string& job_id, std::uint64_t token,
-                   double period_s, const std::function<bool(const v1::JobEvent&)>& enough) {
+                   double period_s, const std::function<bool(const cell_v1::JobEvent&)>& enough) {
   const auto channel = connections.Open("cell");
   if (!channel.ok()) {
     return channel.status();
   }
   CellService::Stub stub(*channel);
   grpc::ClientContext context;
-  v1::WatchJobsRequest request;
+  cell_v1::WatchJobsRequest request;
   request.set_job_id(job_id);
   request.set_resume_token(token);
   request.set_period_s(period_s);
   const auto stream = stub.WatchJobs(&context, request);
-  v1::JobEvent event;
+  cell_v1::JobEvent event;
   while (stream->Read(&event)) {
     if (enough(event)) {
       context.TryCancel();
@@ -118,10 +119,10 @@ absl::Status Watch(const Connections& connections, const std::string& job_id, st
   return connections.Named("cell", FromWire(stream->Finish()));
 }
 
-absl::StatusOr<v1::Job> Show(const Connections& connections, const std::string& job_id) {
-  v1::GetJobRequest request;
+absl::StatusOr<cell_v1::Job> Show(const Connections& connections, const std::string& job_id) {
+  cell_v1::GetJobRequest request;
   request.set_job_id(job_id);
-  v1::GetJobResponse response;
+  cell_v1::GetJobResponse response;
   const absl::Status status =
       connections.Ask<CellService>("cell", &CellService::Stub::GetJob, request, response);
   if (!status.ok()) {
@@ -136,9 +137,9 @@ absl::Status Follow(const Connections& connections, const std::string& job_id, O
   if (!job.ok()) {
     return job.status();
   }
-  v1::JobState told = v1::JOB_STATE_UNSPECIFIED;
+  cell_v1::JobState told = cell_v1::JOB_STATE_UNSPECIFIED;
   std::string reason;
-  const auto tell = [&](const v1::Job& now) {
+  const auto tell = [&](const cell_v1::Job& now) {
     *job = now;
     output.Progress(now.progress(), fmt::format("{} {:.1f}/{:.1f} mm {:.1f} mm/s", StateName(now.state()),
                                                 now.s_mm(), now.length_mm(), now.feed_mm_per_s()));
@@ -152,11 +153,11 @@ absl::Status Follow(const Connections& connections, const std::string& job_id, O
         output.Text(Line(now), ToneOf(now.state()));
       }
     }
-    return HasEnded(now.state()) || now.state() == v1::JOB_STATE_INTERRUPTED;
+    return HasEnded(now.state()) || now.state() == cell_v1::JOB_STATE_INTERRUPTED;
   };
   absl::Status status = tell(*job) ? absl::OkStatus()
                                    : Watch(connections, job_id, 0, 0.2,
-                                           [&](const v1::JobEvent& event) { return tell(event.job()); });
+                                           [&](const cell_v1::JobEvent& event) { return tell(event.job()); });
   if (status.ok()) {
     ExitAs(*job, output);
   }
@@ -186,7 +187,7 @@ absl::Status Submit(const SubmitOptions& options, const Connections& connections
   if (!program.ok()) {
     return program.status();
   }
-  v1::SubmitJobRequest request;
+  cell_v1::SubmitJobRequest request;
   request.set_request_id(options.request_id.empty() ? NewRequestId() : options.request_id);
   request.set_name(options.name.empty()
                        ? options.file.substr(options.file.find_last_of('/') + 1).substr(0, 128)
@@ -203,27 +204,27 @@ absl::Status Submit(const SubmitOptions& options, const Connections& connections
   if (options.machine_version) {
     request.set_machine_version(*options.machine_version);
   }
-  v1::SubmitJobResponse response;
+  cell_v1::SubmitJobResponse response;
   absl::Status status =
       connections.Ask<CellService>("cell", &CellService::Stub::SubmitJob, request, response);
   if (!status.ok()) {
     return status;
   }
-  v1::Job job = response.job();
-  if (job.state() == v1::JOB_STATE_ADMITTING && options.start) {
-    status = Watch(connections, job.job_id(), 0, 0.2, [&](const v1::JobEvent& event) {
+  cell_v1::Job job = response.job();
+  if (job.state() == cell_v1::JOB_STATE_ADMITTING && options.start) {
+    status = Watch(connections, job.job_id(), 0, 0.2, [&](const cell_v1::JobEvent& event) {
       job = event.job();
-      return job.state() != v1::JOB_STATE_ADMITTING;
+      return job.state() != cell_v1::JOB_STATE_ADMITTING;
     });
   }
-  if (!status.ok() || !options.start || job.state() != v1::JOB_STATE_READY) {
+  if (!status.ok() || !options.start || job.state() != cell_v1::JOB_STATE_READY) {
     PrintJob(job, output);
     ExitAs(job, output);
     return status;
   }
-  v1::StartJobRequest start;
+  cell_v1::StartJobRequest start;
   start.set_job_id(job.job_id());
-  v1::StartJobResponse started;
+  cell_v1::StartJobResponse started;
   status = connections.Ask<CellService>("cell", &CellService::Stub::StartJob, start, started);
   if (!status.ok() || options.watch) {
     return status.ok() ? Follow(connections, job.job_id(), output) : status;
@@ -253,17 +254,17 @@ void AddJobVerb(CLI::App& noun, const char* name, const char* what,
 }
 
 absl::Status List(const std::string& state, bool all, const Connections& connections, Output& output) {
-  v1::ListJobsRequest request;
+  cell_v1::ListJobsRequest request;
   request.set_page_size(all ? 100 : 20);
-  v1::JobState wanted = v1::JOB_STATE_UNSPECIFIED;
-  if (!state.empty() && !v1::JobState_Parse("JOB_STATE_" + state, &wanted)) {
+  cell_v1::JobState wanted = cell_v1::JOB_STATE_UNSPECIFIED;
+  if (!state.empty() && !cell_v1::JobState_Parse("JOB_STATE_" + state, &wanted)) {
     return Trouble(absl::StatusCode::kInvalidArgument, "UNKNOWN_STATE",
                    state + " is no job state; READY, RUNNING, COMPLETED and the like are right");
   }
   request.set_state(wanted);
-  v1::ListJobsResponse whole;
+  cell_v1::ListJobsResponse whole;
   do {
-    v1::ListJobsResponse page;
+    cell_v1::ListJobsResponse page;
     absl::Status status = connections.Ask<CellService>("cell", &CellService::Stub::ListJobs, request, page);
     if (!status.ok()) {
       return status;
@@ -276,7 +277,7 @@ absl::Status List(const std::string& state, bool all, const Connections& connect
     return absl::OkStatus();
   }
   TextTable table{{"job", "state", "done_%", "length_mm", "name", "submitted", "reason"}, {}};
-  for (const v1::Job& job : whole.jobs()) {
+  for (const cell_v1::Job& job : whole.jobs()) {
     table.rows.push_back({job.job_id(), StateName(job.state()), Fixed(job.progress() * 100, 0),
                           Fixed(job.length_mm(), 1), job.name(), job.submitted(), job.reason()});
   }
@@ -285,7 +286,7 @@ absl::Status List(const std::string& state, bool all, const Connections& connect
 }
 
 absl::Status WatchAll(std::uint64_t token, const Connections& connections, Output& output) {
-  return Watch(connections, "", token, 0.5, [&](const v1::JobEvent& event) {
+  return Watch(connections, "", token, 0.5, [&](const cell_v1::JobEvent& event) {
     if (output.json()) {
       PrintJson(event, output);
     } else if (event.token() != 0) {
@@ -310,9 +311,9 @@ CsvTable Strided(std::vector<std::string> columns, const google::protobuf::Repea
 
 absl::Status Report(const std::string& job_id, const std::string& trace, const std::string& events,
                     const Connections& connections, Output& output) {
-  v1::GetReportRequest request;
+  cell_v1::GetReportRequest request;
   request.set_job_id(job_id);
-  v1::GetReportResponse report;
+  cell_v1::GetReportResponse report;
   absl::Status status = connections.Ask<CellService>("cell", &CellService::Stub::GetReport, request, report);
   if (status.ok() && !trace.empty()) {
     status = WriteCsv(trace, Strided({"time_s", "actuator_1_mm", "actuator_2_mm", "actuator_1_mm_per_s",
@@ -403,7 +404,7 @@ void AddReading(CLI::App& noun, Output& output, const Connections& connections) 
 }
 
 void AddResumeStopOverride(CLI::App& noun, Output& output, const Connections& connections) {
-  auto resumed = std::make_shared<v1::ResumeJobRequest>();
+  auto resumed = std::make_shared<cell_v1::ResumeJobRequest>();
   auto resumed_id = std::make_shared<std::string>();
   auto overlap = std::make_shared<std::optional<double>>();
   CLI::App* resume =
@@ -415,7 +416,7 @@ void AddResumeStopOverride(CLI::App& noun, Output& output, const Connections& co
     if (*overlap) {
       resumed->set_overlap_mm(**overlap);
     }
-    v1::ResumeJobResponse response;
+    cell_v1::ResumeJobResponse response;
     const absl::Status status =
         connections.Ask<CellService>("cell", &CellService::Stub::ResumeJob, *resumed, response);
     if (status.ok()) {
@@ -429,9 +430,9 @@ void AddResumeStopOverride(CLI::App& noun, Output& output, const Connections& co
       noun.add_subcommand("stop", "stop both modules on the path (category 1); latched until machine reset");
   stop->add_option("JOB", *stopped, "only if this job runs; none named: whatever runs");
   stop->callback([stopped, &output, &connections] {
-    v1::StopJobRequest request;
+    cell_v1::StopJobRequest request;
     request.set_job_id(*stopped);
-    v1::StopJobResponse response;
+    cell_v1::StopJobResponse response;
     const absl::Status status =
         connections.Ask<CellService>("cell", &CellService::Stub::StopJob, request, response);
     if (status.ok() && response.has_job()) {
@@ -447,9 +448,9 @@ void AddResumeStopOverride(CLI::App& noun, Output& output, const Connections& co
   CLI::App* override_verb = noun.add_subcommand("override", "feed override, 0 to 1.2");
   override_verb->add_option("FACTOR", *factor, "1 is as programmed")->required();
   override_verb->callback([factor, &output, &connections] {
-    v1::SetFeedOverrideRequest request;
+    cell_v1::SetFeedOverrideRequest request;
     request.set_feed_override(*factor);
-    v1::SetFeedOverrideResponse response;
+    cell_v1::SetFeedOverrideResponse response;
     const absl::Status status =
         connections.Ask<CellService>("cell", &CellService::Stub::SetFeedOverride, request, response);
     if (status.ok()) {
@@ -464,15 +465,16 @@ void AddResumeStopOverride(CLI::App& noun, Output& output, const Connections& co
 
 void AddJobVerbs(CLI::App& noun, Output& output, const Connections& connections) {
   AddSubmit(noun, output, connections);
-  AddJobVerb<v1::StartJobRequest, v1::StartJobResponse>(noun, "start", "load, arm and start a READY job",
-                                                        &CellService::Stub::StartJob, output, connections);
-  AddJobVerb<v1::HoldJobRequest, v1::HoldJobResponse>(noun, "hold", "feed hold on the path",
-                                                      &CellService::Stub::HoldJob, output, connections);
+  AddJobVerb<cell_v1::StartJobRequest, cell_v1::StartJobResponse>(
+      noun, "start", "load, arm and start a READY job", &CellService::Stub::StartJob, output, connections);
+  AddJobVerb<cell_v1::HoldJobRequest, cell_v1::HoldJobResponse>(
+      noun, "hold", "feed hold on the path", &CellService::Stub::HoldJob, output, connections);
   AddResumeStopOverride(noun, output, connections);
-  AddJobVerb<v1::CancelJobRequest, v1::CancelJobResponse>(noun, "cancel", "give up a job that is not running",
-                                                          &CellService::Stub::CancelJob, output, connections);
-  AddJobVerb<v1::GetJobRequest, v1::GetJobResponse>(noun, "show", "one job", &CellService::Stub::GetJob,
-                                                    output, connections);
+  AddJobVerb<cell_v1::CancelJobRequest, cell_v1::CancelJobResponse>(
+      noun, "cancel", "give up a job that is not running", &CellService::Stub::CancelJob, output,
+      connections);
+  AddJobVerb<cell_v1::GetJobRequest, cell_v1::GetJobResponse>(
+      noun, "show", "one job", &CellService::Stub::GetJob, output, connections);
   AddReading(noun, output, connections);
 }
 

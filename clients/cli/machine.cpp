@@ -7,15 +7,15 @@
 namespace lambdajet::cli {
 namespace {
 
-namespace v1 = cell::v1;
-using v1::CellService;
+namespace cell_v1 = cell::v1;
+using cell_v1::CellService;
 
-void PrintMachine(const v1::MachineState& state, Output& output) {
+void PrintMachine(const cell_v1::MachineState& state, Output& output) {
   if (output.json()) {
     return PrintJson(state, output);
   }
   TextTable table{{"node", "mode", "reason", "age_s"}, {}};
-  for (const v1::NodeState& node : state.nodes()) {
+  for (const cell_v1::NodeState& node : state.nodes()) {
     table.rows.push_back({node.name(), node.mode(), node.reason(), Fixed(node.age_s(), 2)});
   }
   output.Table(table);
@@ -37,9 +37,9 @@ void PrintMachine(const v1::MachineState& state, Output& output) {
 void AddMachineVerbs(CLI::App& noun, Output& output, const Connections& connections) {
   noun.add_subcommand("state", "modules, services and every veto; exit code 6 while a start is forbidden")
       ->callback([&] {
-        v1::GetMachineStateResponse response;
+        cell_v1::GetMachineStateResponse response;
         const absl::Status status = connections.Ask<CellService>("cell", &CellService::Stub::GetMachineState,
-                                                                 v1::GetMachineStateRequest(), response);
+                                                                 cell_v1::GetMachineStateRequest(), response);
         if (!status.ok()) {
           return output.Fail(status);
         }
@@ -48,9 +48,9 @@ void AddMachineVerbs(CLI::App& noun, Output& output, const Connections& connecti
       });
   noun.add_subcommand("reset", "reset latched stops and reference both modules; starts no job")
       ->callback([&] {
-        v1::ResetMachineResponse response;
-        const absl::Status status = connections.Ask<CellService>("cell", &CellService::Stub::ResetMachine,
-                                                                 v1::ResetMachineRequest(), response, 120.0);
+        cell_v1::ResetMachineResponse response;
+        const absl::Status status = connections.Ask<CellService>(
+            "cell", &CellService::Stub::ResetMachine, cell_v1::ResetMachineRequest(), response, 120.0);
         if (status.ok()) {
           PrintMachine(response.state(), output);
         }

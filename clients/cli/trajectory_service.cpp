@@ -18,8 +18,8 @@
 namespace lambdajet::cli {
 namespace {
 
-namespace v1 = trajectory::v1;
-using v1::TrajectoryService;
+namespace trajectory_v1 = trajectory::v1;
+using trajectory_v1::TrajectoryService;
 
 constexpr double kPlanning_s = 600.0;
 const std::vector<std::string> kSpatialColumns = {"tau_s",
@@ -67,8 +67,8 @@ void AddMechanismOption(CLI::App& verb, std::string& mechanism) {
       ->capture_default_str();
 }
 
-v1::Mechanism MechanismOf(const std::string& name) {
-  return name == "hexapod" ? v1::MECHANISM_HEXAPOD : v1::MECHANISM_UNSPECIFIED;
+trajectory_v1::Mechanism MechanismOf(const std::string& name) {
+  return name == "hexapod" ? trajectory_v1::MECHANISM_HEXAPOD : trajectory_v1::MECHANISM_UNSPECIFIED;
 }
 
 void AddProgramOptions(CLI::App& verb, ProgramOptions& options) {
@@ -88,21 +88,21 @@ void AddProgramOptions(CLI::App& verb, ProgramOptions& options) {
   verb.add_option("--machine-version", options.machine_version, "only with this version of the machine");
 }
 
-v1::PlanOptions ToWire(const ProgramOptions& options) {
-  v1::PlanOptions wire;
+trajectory_v1::PlanOptions ToWire(const ProgramOptions& options) {
+  trajectory_v1::PlanOptions wire;
   wire.set_mechanism(MechanismOf(options.mechanism));
   wire.set_compensate(options.compensate);
   if (options.tolerance_mm) wire.set_tolerance_mm(*options.tolerance_mm);
   for (const std::string& text : options.tolerance_lines) {
     const ToleranceWord word = ParseTolerance(text).value_or(ToleranceWord{});
-    v1::ToleranceWish& wish = *wire.add_tolerances();
+    trajectory_v1::ToleranceWish& wish = *wire.add_tolerances();
     wish.set_tolerance_mm(word.tolerance_mm);
     wish.set_first_line(word.first);
     wish.set_last_line(word.last);
   }
   for (const std::string& text : options.tolerance_contours) {
     const ToleranceWord word = ParseTolerance(text).value_or(ToleranceWord{});
-    v1::ToleranceWish& wish = *wire.add_tolerances();
+    trajectory_v1::ToleranceWish& wish = *wire.add_tolerances();
     wish.set_tolerance_mm(word.tolerance_mm);
     wish.set_contour(word.first);
   }
@@ -128,16 +128,17 @@ absl::Status Fill(const std::string& file, const FormatOptions& format, Request&
   return absl::OkStatus();
 }
 
-void PrintFaults(const google::protobuf::RepeatedPtrField<v1::ProgramFault>& faults, Output& output) {
-  for (const v1::ProgramFault& fault : faults) {
+void PrintFaults(const google::protobuf::RepeatedPtrField<trajectory_v1::ProgramFault>& faults,
+                 Output& output) {
+  for (const trajectory_v1::ProgramFault& fault : faults) {
     output.Text(fmt::format("line {}, column {}: {}: {}", fault.line(), fault.column(), fault.reason(),
                             fault.message()),
                 Tone::kBad);
   }
 }
 
-void PrintSpatial(const v1::PlanSummary& plan, Output& output) {
-  const v1::SpatialSummary& s = plan.spatial();
+void PrintSpatial(const trajectory_v1::PlanSummary& plan, Output& output) {
+  const trajectory_v1::SpatialSummary& s = plan.spatial();
   output.Table(
       {{"what", "value", "unit"},
        {{"plan", std::to_string(plan.plan_id()), ""},
@@ -156,7 +157,7 @@ void PrintSpatial(const v1::PlanSummary& plan, Output& output) {
         {"singular margin", Fixed(s.singular_margin_ratio(), 3), "mm/mm"}}});
 }
 
-void PrintLambda(const v1::PlanSummary& plan, Output& output) {
+void PrintLambda(const trajectory_v1::PlanSummary& plan, Output& output) {
   output.Table({{"what", "value", "unit"},
                 {{"plan", std::to_string(plan.plan_id()), ""},
                  {"machine version", std::to_string(plan.model_version().version()), ""},
@@ -172,10 +173,10 @@ void PrintLambda(const v1::PlanSummary& plan, Output& output) {
                  {"predicted 95 % bound", Fixed(plan.predicted_95_mm(), 4), "mm"}}});
 }
 
-void PrintSummary(const v1::PlanSummary& plan, Output& output) {
+void PrintSummary(const trajectory_v1::PlanSummary& plan, Output& output) {
   plan.has_spatial() ? PrintSpatial(plan, output) : PrintLambda(plan, output);
   TextTable limits{{"limit", "length_mm", "share_%"}, {}};
-  for (const v1::BindingLimit& limit : plan.binding_limits()) {
+  for (const trajectory_v1::BindingLimit& limit : plan.binding_limits()) {
     limits.rows.push_back({limit.limit(), Fixed(limit.length_mm(), 1), Fixed(limit.share() * 100, 1)});
   }
   if (!limits.rows.empty()) {
@@ -185,7 +186,7 @@ void PrintSummary(const v1::PlanSummary& plan, Output& output) {
   TextTable held{
       {"contour", "lines", "tolerance_mm", "predicted_95_mm", "worst_mm", "at line", "left_mm", "most from"},
       {}};
-  for (const v1::HeldTolerance& h : plan.held_tolerances()) {
+  for (const trajectory_v1::HeldTolerance& h : plan.held_tolerances()) {
     held.rows.push_back({std::to_string(h.contour()), fmt::format("{}-{}", h.first_line(), h.last_line()),
                          Fixed(h.tolerance_mm(), 3), Fixed(h.predicted_95_mm(), 4), Fixed(h.worst_mm(), 4),
                          std::to_string(h.worst_line()), Fixed(h.margin_mm(), 4), h.worst_source()});
@@ -198,13 +199,13 @@ void PrintSummary(const v1::PlanSummary& plan, Output& output) {
 }
 
 absl::Status Check(const ProgramOptions& options, const Connections& connections, Output& output) {
-  v1::AdmitProgramRequest request;
+  trajectory_v1::AdmitProgramRequest request;
   absl::Status status = Fill(options.file, options.format, request);
   if (!status.ok()) {
     return status;
   }
   *request.mutable_options() = ToWire(options);
-  v1::AdmitProgramResponse response;
+  trajectory_v1::AdmitProgramResponse response;
   status = connections.Ask<TrajectoryService>("trajectory", &TrajectoryService::Stub::AdmitProgram, request,
                                               response);
   if (!status.ok()) {
@@ -228,7 +229,7 @@ absl::Status Check(const ProgramOptions& options, const Connections& connections
 }
 
 absl::Status CheckInSteps(const ProgramOptions& options, const Connections& connections, Output& output) {
-  v1::AdmitProgramRequest request;
+  trajectory_v1::AdmitProgramRequest request;
   const absl::Status filled = Fill(options.file, options.format, request);
   const auto channel = connections.Open("trajectory");
   if (!filled.ok() || !channel.ok()) {
@@ -239,16 +240,16 @@ absl::Status CheckInSteps(const ProgramOptions& options, const Connections& conn
   grpc::ClientContext context;
   SetDeadline(context, kPlanning_s);
   const auto stream = stub.AdmitProgramInSteps(&context, request);
-  v1::AdmissionStep step;
+  trajectory_v1::AdmissionStep step;
   bool refused = false;
   while (stream->Read(&step)) {
-    if (step.state() == v1::AdmissionStep::STATE_RUNNING) {
+    if (step.state() == trajectory_v1::AdmissionStep::STATE_RUNNING) {
       output.Progress(step.progress(), step.step());
       continue;
     }
     output.EndProgress();
     PrintJson(step, output);
-    refused = step.state() == v1::AdmissionStep::STATE_REFUSED;
+    refused = step.state() == trajectory_v1::AdmissionStep::STATE_REFUSED;
     output.Text(fmt::format("{:<9} {}", step.step(), refused ? "refused" : "passed"),
                 refused ? Tone::kBad : Tone::kGood);
     PrintFaults(step.faults(), output);
@@ -261,7 +262,7 @@ absl::Status CheckInSteps(const ProgramOptions& options, const Connections& conn
 }
 
 // Prints what the service sends, piece by piece.
-absl::Status Export(const v1::ExportRequest& request, const std::string& out,
+absl::Status Export(const trajectory_v1::ExportRequest& request, const std::string& out,
                     const Connections& connections) {
   const auto channel = connections.Open("trajectory");
   if (!channel.ok()) {
@@ -271,7 +272,7 @@ absl::Status Export(const v1::ExportRequest& request, const std::string& out,
   grpc::ClientContext context;
   SetDeadline(context, kPlanning_s);
   const auto stream = stub.Export(&context, request);
-  v1::ExportPiece piece;
+  trajectory_v1::ExportPiece piece;
   std::string text;
   while (stream->Read(&piece)) {
     text += piece.content();
@@ -283,8 +284,8 @@ absl::Status Export(const v1::ExportRequest& request, const std::string& out,
 absl::Status List(const Connections& connections, Output& output) {
   TextTable table{{"plan", "machine version", "duration s", "jet on mm", "compensated", "predicted 95 % mm"},
                   {}};
-  v1::ListPlansRequest request;
-  v1::ListPlansResponse response;
+  trajectory_v1::ListPlansRequest request;
+  trajectory_v1::ListPlansResponse response;
   do {
     request.set_page_token(response.next_page_token());
     const absl::Status status = connections.Ask<TrajectoryService>(
@@ -293,7 +294,7 @@ absl::Status List(const Connections& connections, Output& output) {
       return status;
     }
     PrintJson(response, output);
-    for (const v1::PlanSummary& plan : response.plans()) {
+    for (const trajectory_v1::PlanSummary& plan : response.plans()) {
       table.rows.push_back({std::to_string(plan.plan_id()), std::to_string(plan.model_version().version()),
                             Fixed(plan.duration_s(), 2), Fixed(plan.cutting_length_mm(), 1),
                             plan.compensated() ? "yes" : "no",
@@ -304,7 +305,7 @@ absl::Status List(const Connections& connections, Output& output) {
   return absl::OkStatus();
 }
 
-absl::Status Show(const v1::GetPlanResponse& plan, Output& output) {
+absl::Status Show(const trajectory_v1::GetPlanResponse& plan, Output& output) {
   if (output.json()) {
     PrintJson(plan, output);
   } else if (plan.has_summary()) {
@@ -328,10 +329,10 @@ absl::Status Watch(std::uint64_t plan_id, const Connections& connections, Output
   TrajectoryService::Stub stub(*channel);
   grpc::ClientContext context;
   SetDeadline(context, kPlanning_s);
-  v1::WatchPlanRequest request;
+  trajectory_v1::WatchPlanRequest request;
   request.set_plan_id(plan_id);
   const auto stream = stub.WatchPlan(&context, request);
-  v1::GetPlanResponse plan;
+  trajectory_v1::GetPlanResponse plan;
   while (stream->Read(&plan)) {
     if (plan.operation().state() == type::v1::OPERATION_STATE_RUNNING) {
       output.Progress(plan.operation().progress(), plan.operation().phase());
@@ -343,10 +344,10 @@ absl::Status Watch(std::uint64_t plan_id, const Connections& connections, Output
 }
 
 absl::Status Plan(const ProgramOptions& options, const Connections& connections, Output& output) {
-  v1::PlanProgramRequest request;
+  trajectory_v1::PlanProgramRequest request;
   absl::Status status = Fill(options.file, options.format, request);
   *request.mutable_options() = ToWire(options);
-  v1::PlanProgramResponse asked;
+  trajectory_v1::PlanProgramResponse asked;
   if (status.ok()) {
     status = connections.Ask<TrajectoryService>("trajectory", &TrajectoryService::Stub::PlanProgram, request,
                                                 asked);
@@ -411,17 +412,17 @@ struct ExportOptions {
 };
 
 absl::Status RunExport(const ExportOptions& options, const Connections& connections) {
-  v1::ExportRequest request;
+  trajectory_v1::ExportRequest request;
   request.set_plan_id(options.plan_id);
   if (options.step_s) request.set_step_s(*options.step_s);
-  request.set_format(options.as == "gcode"       ? v1::ExportRequest::FORMAT_GCODE
-                     : options.as == "cldata"    ? v1::ExportRequest::FORMAT_CLDATA
-                     : options.as == "canonical" ? v1::ExportRequest::FORMAT_CANONICAL
-                     : options.as == "samples"   ? v1::ExportRequest::FORMAT_SAMPLES_CSV
-                     : options.plan_id != 0      ? v1::ExportRequest::FORMAT_SAMPLES_CSV
-                                                 : v1::ExportRequest::FORMAT_CANONICAL);
+  request.set_format(options.as == "gcode"       ? trajectory_v1::ExportRequest::FORMAT_GCODE
+                     : options.as == "cldata"    ? trajectory_v1::ExportRequest::FORMAT_CLDATA
+                     : options.as == "canonical" ? trajectory_v1::ExportRequest::FORMAT_CANONICAL
+                     : options.as == "samples"   ? trajectory_v1::ExportRequest::FORMAT_SAMPLES_CSV
+                     : options.plan_id != 0      ? trajectory_v1::ExportRequest::FORMAT_SAMPLES_CSV
+                                                 : trajectory_v1::ExportRequest::FORMAT_CANONICAL);
   if (options.plan_id == 0) {
-    v1::ListOperationsRequest program;
+    trajectory_v1::ListOperationsRequest program;
     if (const absl::Status status = Fill(options.file, options.format, program); !status.ok()) {
       return status;
     }
@@ -575,13 +576,13 @@ absl::Status ReadPlanPoints(const Connections& connections, std::uint64_t plan_i
   TrajectoryService::Stub stub(*channel);
   grpc::ClientContext context;
   SetDeadline(context, connections.timeout_s());
-  v1::StreamSamplesRequest request;
+  trajectory_v1::StreamSamplesRequest request;
   request.set_plan_id(plan_id);
   if (step_s) {
     request.set_step_s(*step_s);
   }
   const auto stream = stub.StreamSamples(&context, request);
-  v1::SampleBatch batch;
+  trajectory_v1::SampleBatch batch;
   while (stream->Read(&batch)) {
     points.values.insert(points.values.end(), batch.values().begin(), batch.values().end());
     points.spatial_values.insert(points.spatial_values.end(), batch.spatial_values().begin(),
@@ -621,13 +622,13 @@ void AddTrajectoryServiceVerbs(CLI::App& noun, Output& output, const Connections
     if (const absl::Status status = Plan(*planned, connections, output); !status.ok()) output.Fail(status);
   });
 
-  auto shown = std::make_shared<v1::GetPlanRequest>();
+  auto shown = std::make_shared<trajectory_v1::GetPlanRequest>();
   auto shown_id = std::make_shared<std::uint64_t>(0);
   CLI::App* show = AddServiceVerb(noun, "show", "a plan that trajectory has");
   show->add_option("PLAN", *shown_id, "the plan's id")->required();
   show->callback([shown, shown_id, &output, &connections] {
     shown->set_plan_id(*shown_id);
-    v1::GetPlanResponse response;
+    trajectory_v1::GetPlanResponse response;
     absl::Status status =
         connections.Ask<TrajectoryService>("trajectory", &TrajectoryService::Stub::GetPlan, *shown, response);
     status.Update(status.ok() ? Show(response, output) : absl::OkStatus());

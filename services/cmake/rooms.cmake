@@ -19,7 +19,7 @@ find_package(OpenSSL REQUIRED)
 find_package(SQLite3 REQUIRED)
 
 find_program(CCACHE ccache)
-if(CCACHE)
+if(CCACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
   set(CMAKE_CXX_COMPILER_LAUNCHER ${CCACHE})
 endif()
 
@@ -34,6 +34,17 @@ if(LAMBDAJET_SANITIZE)
   add_compile_options(-fsanitize=${LAMBDAJET_SANITIZE} -fno-omit-frame-pointer)
   add_link_options(-fsanitize=${LAMBDAJET_SANITIZE})
 endif()
+
+# A file of gRPC, Fast DDS or GoogleTest spends most of its compiling on headers, so a whole build (deploy/build) joins the
+# files of a door, a program or a check. The preset alone compiles each by itself: there a change costs one file.
+option(LAMBDAJET_JOINED "Compile the files of a target joined (CMake's unity build)" OFF)
+function(lambdajet_joined target)
+  set_target_properties(${target} PROPERTIES UNITY_BUILD ${LAMBDAJET_JOINED} UNITY_BUILD_BATCH_SIZE 8)
+  if(LAMBDAJET_JOINED)
+    # A class of a .cpp may hold what only that file knows; g++ sees the joined file and takes it for a header's.
+    target_compile_options(${target} PRIVATE -Wno-subobject-linkage)
+  endif()
+endfunction()
 
 # Every target of ours: warnings are errors; includes start at services/ and at the generated roots.
 function(lambdajet_own_code target)
@@ -61,6 +72,7 @@ function(lambdajet_door name)
   cmake_parse_arguments(ROOM "" "" "SOURCES;DEPS" ${ARGN})
   add_library(${name} STATIC ${ROOM_SOURCES})
   lambdajet_own_code(${name})
+  lambdajet_joined(${name})
   target_link_libraries(${name} PUBLIC ${ROOM_DEPS})
 endfunction()
 
@@ -69,6 +81,7 @@ function(lambdajet_program name)
   cmake_parse_arguments(PROGRAM "" "" "SOURCES;DEPS" ${ARGN})
   add_executable(${name}_program ${PROGRAM_SOURCES})
   lambdajet_own_code(${name}_program)
+  lambdajet_joined(${name}_program)
   target_link_libraries(${name}_program PRIVATE ${PROGRAM_DEPS})
   set_target_properties(${name}_program PROPERTIES OUTPUT_NAME ${name} RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin)
 endfunction()
@@ -78,6 +91,7 @@ function(lambdajet_check name)
   cmake_parse_arguments(CHECK "SERIAL" "TIMEOUT" "SOURCES;DEPS;LABELS;ENVIRONMENT" ${ARGN})
   add_executable(${name} ${CHECK_SOURCES})
   lambdajet_own_code(${name})
+  lambdajet_joined(${name})
   # A third off the time to compile a test (a precompiled header takes off half as much); laws count to a million.
   # At -O1 g++ inlines a test's own operator delete and not the new that goes with it, and finds them mismatched.
   if(NOT CHECK_LABELS MATCHES "laws|benchmark|fuzz")

@@ -18,7 +18,7 @@ namespace lambdajet::kinematics {
 namespace {
 
 using Numbers = google::protobuf::RepeatedField<double>;
-using Six = Eigen::Matrix<double, 6, 1>;
+using SixVector = Eigen::Matrix<double, 6, 1>;
 
 std::uint32_t FreedomsOf(const SelectedMechanism& selected) { return selected.hexapod ? kStruts : 2; }
 
@@ -60,11 +60,12 @@ bool AllFinite(const double* numbers, std::size_t count) {
 }
 
 // The second and third group of `freedoms` numbers, 0 where there are none.
-Six DerivativeIn(const double* in, std::uint32_t derivatives, std::uint32_t order) {
-  return derivatives >= order ? Six(Eigen::Map<const Six>(in + kStruts * order)) : Six(Six::Zero());
+SixVector DerivativeIn(const double* in, std::uint32_t derivatives, std::uint32_t order) {
+  return derivatives >= order ? SixVector(Eigen::Map<const SixVector>(in + kStruts * order))
+                              : SixVector(SixVector::Zero());
 }
 
-void Put(const Six& numbers, double* out) { std::copy_n(numbers.data(), 6, out); }
+void Put(const SixVector& numbers, double* out) { std::copy_n(numbers.data(), 6, out); }
 
 void Put(const Eigen::Vector3d& first, const Eigen::Vector3d& second, double* out) {
   std::copy_n(first.data(), 3, out);
@@ -86,7 +87,7 @@ Reason InverseOf(const Hexapod& hexapod, std::uint32_t derivatives, const double
     Put(answer.actuators_mm, out);
   }
   if (derivatives > 0 && answer.reason == Reason::kSolved) {
-    const Six twist = DerivativeIn(in, derivatives, 1), rate = DerivativeIn(in, derivatives, 2);
+    const SixVector twist = DerivativeIn(in, derivatives, 1), rate = DerivativeIn(in, derivatives, 2);
     const ActuatorMotion motion = ActuatorMotionOfTool(hexapod, X_MP, {twist.head<3>(), twist.tail<3>()},
                                                        {rate.head<3>(), rate.tail<3>()})
                                       .motion;

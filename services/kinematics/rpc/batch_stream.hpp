@@ -32,7 +32,7 @@ class BatchStream final : public grpc::ServerBidiReactor<Request, Response> {
       return;
     }
     if (!ok || !status.ok()) {
-      end_ = ToWire(status);
+      end_ = lambdajet::ToWire(status);
       ended_ = true;
       return FinishWhenWritten();
     }

@@ -20,7 +20,7 @@ constexpr double kLargestVariance = 1e12;
 constexpr std::size_t kPointNumbers = 9;
 
 using Numbers = google::protobuf::RepeatedField<double>;
-using Six = Eigen::Matrix<double, 6, 6, Eigen::RowMajor>;
+using SixBySix = Eigen::Matrix<double, 6, 6, Eigen::RowMajor>;
 
 // As many factors as any message may have; no message allocates.
 struct Factors {
@@ -109,7 +109,7 @@ Pose PlaceFromWire(const v1::ErrorElement& wire, const std::string& field, Argum
 
 // Everything of the question but its samples.
 struct Stack {
-  std::array<Six, kMostFactors> map;
+  std::array<SixBySix, kMostFactors> map;
   std::size_t count = 0;
 };
 
@@ -139,9 +139,9 @@ void CovarianceToWire(const Stack& stack, const Numbers& covariance, ArgumentChe
   if (!checks.ok()) {
     return;
   }
-  Six sum = Six::Zero();
+  SixBySix sum = SixBySix::Zero();
   for (std::size_t k = 0; k < stack.count; ++k) {
-    sum += stack.map[k] * Eigen::Map<const Six>(covariance.data() + 36 * k) * stack.map[k].transpose();
+    sum += stack.map[k] * Eigen::Map<const SixBySix>(covariance.data() + 36 * k) * stack.map[k].transpose();
   }
   MatrixToWire(sum, *response.mutable_covariance());
 }

@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::size_t kMostBodies = 64;
 constexpr std::size_t kMostPaths = 1'024;
-constexpr double kLargestMm = 1e6;
+constexpr double kLargestSheetMm = 1e6;
 
 using Points = std::vector<Eigen::Vector2d>;
 
@@ -25,8 +25,8 @@ Points PolygonFromWire(const v1::Polygon& wire, const std::string& field, Argume
   checks.Require(wire.vertex_mm_size() % 2 == 0, field + ".vertex_mm", "BAD_STRIDE",
                  "takes pairs of x and y");
   for (int i = 0; checks.ok() && i < wire.vertex_mm_size(); i += 2) {
-    checks.InRange(field + ".vertex_mm", wire.vertex_mm(i), -kLargestMm, kLargestMm, "mm");
-    checks.InRange(field + ".vertex_mm", wire.vertex_mm(i + 1), -kLargestMm, kLargestMm, "mm");
+    checks.InRange(field + ".vertex_mm", wire.vertex_mm(i), -kLargestSheetMm, kLargestSheetMm, "mm");
+    checks.InRange(field + ".vertex_mm", wire.vertex_mm(i + 1), -kLargestSheetMm, kLargestSheetMm, "mm");
     corners.emplace_back(wire.vertex_mm(i), wire.vertex_mm(i + 1));
   }
   checks.Require(!checks.ok() || IsConvex(corners), field, "NOT_CONVEX",
@@ -60,7 +60,7 @@ bool PathFromWire(const v1::ToolPath& wire, Points& path) {
   path.clear();
   for (int i = 0; i + 1 < wire.p_de_mm_size(); i += 2) {
     path.emplace_back(wire.p_de_mm(i), wire.p_de_mm(i + 1));
-    if (!(path.back().cwiseAbs().maxCoeff() <= kLargestMm)) {
+    if (!(path.back().cwiseAbs().maxCoeff() <= kLargestSheetMm)) {
       return false;
     }
   }
@@ -80,7 +80,7 @@ void SweptToWire(const SweptAnswer& answer, v1::SweptPath& wire) {
 void CheckPaths(const v1::SweepSheetRequest& request, ArgumentChecks& checks) {
   checks.CountInRange("body", static_cast<std::size_t>(request.body_size()), 1, kMostBodies);
   checks.CountInRange("path", static_cast<std::size_t>(request.path_size()), 1, kMostPaths);
-  checks.InRange("margin_mm", request.margin_mm(), 0.0, kLargestMm, "mm");
+  checks.InRange("margin_mm", request.margin_mm(), 0.0, kLargestSheetMm, "mm");
   std::size_t points = 0;
   for (const v1::ToolPath& path : request.path()) {
     checks.Require(path.p_de_mm_size() % 2 == 0, "path.p_DE_mm", "BAD_STRIDE", "takes pairs of x and y");

@@ -29,7 +29,7 @@ int SignFromWire(const std::string& field, int sign, ArgumentChecks& checks) {
 
 WorkingMode ModeOf(bool given, const v1::WorkingMode& wire, const std::string& field,
                    ArgumentChecks& checks) {
-  return given ? FromWire(wire, field, checks) : WorkingMode{};
+  return given ? kinematics::FromWire(wire, field, checks) : WorkingMode{};
 }
 
 void CheckTravel(const v1::LambdaGeometry& wire, ArgumentChecks& checks) {
@@ -137,7 +137,7 @@ void ToWire(const LambdaMechanism& m, v1::LambdaGeometry& wire) {
   wire.mutable_rail_2()->set_offset_mm(m.parameters[6]);
   wire.mutable_rail_1()->set_slider_zero_mm(m.parameters[7]);
   wire.mutable_rail_2()->set_slider_zero_mm(m.parameters[8]);
-  ToWire(m.working_mode, *wire.mutable_working_mode());
+  kinematics::ToWire(m.working_mode, *wire.mutable_working_mode());
   wire.set_assembly_mode(m.assembly_mode);
   for (const ActuatorTravel& travel : m.travel) {
     v1::Travel& entry = *wire.add_travel();

@@ -16,7 +16,7 @@ using yaml_file::MapReader;
 using yaml_file::ParseNumber;
 using yaml_file::ShortestText;
 
-constexpr std::size_t kMostFileBytes = 1 << 20;
+constexpr std::size_t kMostHexapodFileBytes = 1 << 20;
 
 struct JointKey {
   const char* name;
@@ -103,7 +103,7 @@ void ReadStruts(MapReader& file, Findings& findings, HexapodGeometry& geometry) 
   }
 }
 
-HexapodMachine ReadAll(const YAML::Node& root, Findings& findings) {
+HexapodMachine ReadHexapod(const YAML::Node& root, Findings& findings) {
   HexapodMachine machine;
   MapReader file(root, "", findings);
   machine.machine_id = file.Text("machine_id");
@@ -144,7 +144,7 @@ absl::StatusOr<HexapodMachine> ParseHexapod(const std::string& yaml, const std::
   Findings findings(name);
   HexapodMachine machine;
   try {
-    machine = ReadAll(YAML::Load(yaml), findings);
+    machine = ReadHexapod(YAML::Load(yaml), findings);
   } catch (const YAML::Exception& error) {
     findings.Add("the file", error.mark.line + 1, "is not YAML: " + error.msg, "NOT_YAML");
   }
@@ -164,7 +164,7 @@ absl::StatusOr<HexapodMachine> ParseHexapod(const std::string& yaml, const std::
 }
 
 absl::StatusOr<HexapodMachine> ReadHexapodFile(const std::string& path) {
-  const auto text = ReadWholeFile(path, kMostFileBytes);
+  const auto text = ReadWholeFile(path, kMostHexapodFileBytes);
   return text.ok() ? ParseHexapod(*text, path) : text.status();
 }
 

@@ -23,16 +23,6 @@ absl::Status Bad(const char* reason, const std::string& file, const std::string&
   return Trouble(absl::StatusCode::kInvalidArgument, reason, file + " " + what, {{"path", file}});
 }
 
-absl::StatusOr<std::string> ReadPem(const std::string& file) {
-  auto pem = ReadWholeFile(file, kMostPemBytes);
-  if (pem.ok()) {
-    return pem;
-  }
-  return Trouble(pem.status().code(), TroubleReason(pem.status()),
-                 std::string(pem.status().message()) + "; a PEM file that this user may read is right",
-                 {{"path", file}});
-}
-
 // Refuses instead of asking on the terminal.
 int NoPassword(char*, int, int, void*) { return 0; }
 
@@ -47,6 +37,16 @@ absl::Status ReadCertificate(const std::string& file, Certificate& certificate) 
 }
 
 }  // namespace
+
+absl::StatusOr<std::string> ReadPem(const std::string& file) {
+  auto pem = ReadWholeFile(file, kMostPemBytes);
+  if (pem.ok()) {
+    return pem;
+  }
+  return Trouble(pem.status().code(), TroubleReason(pem.status()),
+                 std::string(pem.status().message()) + "; a PEM file that this user may read is right",
+                 {{"path", file}});
+}
 
 absl::Status CheckCertificates(const std::string& file) {
   Certificate certificate(nullptr, X509_free);

@@ -6,8 +6,12 @@
 #include <string>
 
 #include "absl/status/status.h"
+#include "absl/status/statusor.h"
 
 namespace lambdajet {
+
+// The text of a PEM file of at most 1 MiB.
+absl::StatusOr<std::string> ReadPem(const std::string& file);
 
 // A PEM certificate (chain) and the private key that belongs to it.
 absl::Status CheckKeyPair(const std::string& certificate_file, const std::string& key_file);

@@ -9,13 +9,18 @@
 #include <mutex>
 
 #include "foundation/contract/trouble.hpp"
-#include "platform/process/atomic_file.hpp"
 #include "platform/rpc/certificates.hpp"
 
 namespace lambdajet {
 namespace {
 
-constexpr std::size_t kMostPemBytes = 1 << 20;
+absl::Status ReadInto(const std::string& file, std::string& pem) {
+  auto text = ReadPem(file);
+  if (text.ok()) {
+    pem = *std::move(text);
+  }
+  return text.status();
+}
 
 absl::StatusOr<std::shared_ptr<grpc::ChannelCredentials>> MakeCredentials(const ChannelOptions& options) {
   if (options.ca_file.empty()) {
@@ -25,13 +30,19 @@ absl::StatusOr<std::shared_ptr<grpc::ChannelCredentials>> MakeCredentials(const 
     return status;
   }
   grpc::SslCredentialsOptions ssl;
-  ssl.pem_root_certs = *ReadWholeFile(options.ca_file, kMostPemBytes);
+  if (absl::Status status = ReadInto(options.ca_file, ssl.pem_root_certs); !status.ok()) {
+    return status;
+  }
   if (!options.certificate_file.empty()) {
     if (absl::Status status = CheckKeyPair(options.certificate_file, options.key_file); !status.ok()) {
       return status;
     }
-    ssl.pem_cert_chain = *ReadWholeFile(options.certificate_file, kMostPemBytes);
-    ssl.pem_private_key = *ReadWholeFile(options.key_file, kMostPemBytes);
+    if (absl::Status status = ReadInto(options.certificate_file, ssl.pem_cert_chain); !status.ok()) {
+      return status;
+    }
+    if (absl::Status status = ReadInto(options.key_file, ssl.pem_private_key); !status.ok()) {
+      return status;
+    }
   }
   return grpc::SslCredentials(ssl);
 }

@@ -25,7 +25,7 @@
 namespace lambdajet::trajectory {
 namespace {
 
-namespace wire = lambdajet::idl::trajectory::v1;
+namespace plan_wire = lambdajet::idl::trajectory::v1;
 namespace drive_wire = lambdajet::idl::drive::v1;
 namespace motion_wire = lambdajet::idl::main_motion::v1;
 
@@ -33,7 +33,7 @@ constexpr std::int64_t kPeriod_ns = 5'000'000;
 constexpr std::int64_t kFresh_ns = 200'000'000;
 constexpr int kMostBatchesPerTurn = 4;
 
-void ToWire(const Segment& segment, wire::Segment& to) {
+void ToWire(const Segment& segment, plan_wire::Segment& to) {
   to.index(segment.index);
   to.start_s(segment.start_s);
   to.duration_s(segment.duration_s);
@@ -49,14 +49,14 @@ void ToWire(const Segment& segment, wire::Segment& to) {
   to.gate_at_end(segment.gate_at_end);
 }
 
-void ToWire(const Gate& gate, wire::Gate& to) {
+void ToWire(const Gate& gate, plan_wire::Gate& to) {
   to.id(gate.id);
   to.kind(static_cast<std::uint32_t>(gate.kind));
   to.s_mm(gate.s_mm);
   to.argument(gate.argument);
 }
 
-void ToWire(const ProcessEvent& event, wire::ProcessEvent& to) {
+void ToWire(const ProcessEvent& event, plan_wire::ProcessEvent& to) {
   to.index(event.index);
   to.action(static_cast<std::uint32_t>(event.action));
   to.s_mm(event.s_mm);
@@ -82,8 +82,8 @@ struct PlanStreamer::Link {
   std::uint64_t process_number = 0;
   LatestSample<drive_wire::State> drive;
   LatestSample<motion_wire::State> motion;
-  std::optional<Writer<wire::SegmentBatchPubSubType>> segments;
-  std::optional<Writer<wire::ProcessBatchPubSubType>> process;
+  std::optional<Writer<plan_wire::SegmentBatchPubSubType>> segments;
+  std::optional<Writer<plan_wire::ProcessBatchPubSubType>> process;
   std::optional<Reader<drive_wire::StatePubSubType>> drive_reader;
   std::optional<Reader<motion_wire::StatePubSubType>> motion_reader;
   Counter segments_sent, resends, refused;
@@ -95,13 +95,13 @@ struct PlanStreamer::Link {
   std::uint64_t resent_counted = 0;
   std::uint64_t gates_sent_to = 0;  // session of the drive
   std::size_t gates_sent = 0;
-  wire::SegmentBatch segment_batch;
-  wire::ProcessBatch process_batch;
+  plan_wire::SegmentBatch segment_batch;
+  plan_wire::ProcessBatch process_batch;
   std::thread loop;
 };
 
 bool PlanStreamer::Link::WriteProcess(const Range& gates, const Range& events) {
-  wire::ProcessBatch& batch = process_batch;
+  plan_wire::ProcessBatch& batch = process_batch;
   NextHeader(batch.header(), process_number);
   batch.plan(plan->id);
   batch.gate_total(static_cast<std::uint32_t>(plan->gates.size()));
@@ -136,10 +136,10 @@ absl::StatusOr<std::unique_ptr<PlanStreamer>> PlanStreamer::Open(Participant& bu
   std::unique_ptr<PlanStreamer> streamer(new PlanStreamer());
   streamer->link_ = std::make_unique<Link>(clock);
   Link* link = streamer->link_.get();
-  auto segments = Writer<wire::SegmentBatchPubSubType>::Open(
-      bus, {wire::SEGMENT_TOPIC, idl::schema::k_lambdajet_trajectory_v1_plan, "setpoint"});
-  auto process = Writer<wire::ProcessBatchPubSubType>::Open(
-      bus, {wire::PROCESS_TOPIC, idl::schema::k_lambdajet_trajectory_v1_plan, "setpoint"});
+  auto segments = Writer<plan_wire::SegmentBatchPubSubType>::Open(
+      bus, {plan_wire::SEGMENT_TOPIC, idl::schema::k_lambdajet_trajectory_v1_plan, "setpoint"});
+  auto process = Writer<plan_wire::ProcessBatchPubSubType>::Open(
+      bus, {plan_wire::PROCESS_TOPIC, idl::schema::k_lambdajet_trajectory_v1_plan, "setpoint"});
   auto drive = Reader<drive_wire::StatePubSubType>::Open(
       bus, {drive_wire::STATE_TOPIC, idl::schema::k_lambdajet_drive_v1_state, "state"},
       [link](const drive_wire::State& s, const Arrival& a) { link->drive.Put(s, a); });
@@ -223,7 +223,7 @@ void PlanStreamer::SendSegments(std::int64_t now_ns) {
     if (!range) {
       break;
     }
-    wire::SegmentBatch& batch = link.segment_batch;
+    plan_wire::SegmentBatch& batch = link.segment_batch;
     link.NextHeader(batch.header(), link.segment_number);
     batch.plan(link.plan->id);
     batch.segment_count(static_cast<std::uint32_t>(link.plan->segments.size()));

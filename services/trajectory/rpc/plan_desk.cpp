@@ -8,8 +8,8 @@
 namespace lambdajet::trajectory {
 namespace {
 
-constexpr std::size_t kThreads = 1;
-constexpr std::size_t kMostWaiting = 16;
+constexpr std::size_t kPlanThreads = 1;
+constexpr std::size_t kMostPlansWaiting = 16;
 constexpr int kDraws = 200;
 
 // Without an answer where nothing is cut.
@@ -29,7 +29,7 @@ PlanDesk::PlanDesk(Metrics& metrics)
       plans_failed_(metrics.AddCounter("lambdajet_plans_total", "Plans made.", {{"outcome", "refused"}})),
       planning_time_(metrics.AddHistogram("lambdajet_planning_seconds", "Time to plan a program.",
                                           {0.01, 0.03, 0.1, 0.3, 1, 3, 10, 30, 100})),
-      pool_(kThreads, kMostWaiting) {}
+      pool_(kPlanThreads, kMostPlansWaiting) {}
 
 // Called with the mutex held.
 std::shared_ptr<PlanRecord> PlanDesk::NewRecord(std::uint64_t id, PlanOptions options,

@@ -7,7 +7,7 @@ namespace {
 
 constexpr auto kLook = std::chrono::milliseconds(10);
 constexpr auto kIdle = std::chrono::milliseconds(1000);
-constexpr std::size_t kMostWaiting = 16;
+constexpr std::size_t kMostUpdatesWaiting = 16;
 
 }  // namespace
 
@@ -30,7 +30,7 @@ grpc::ServerWriteReactor<v1::GetPlanResponse>* PlanWatch::Open(std::shared_ptr<c
         Trouble(absl::StatusCode::kResourceExhausted, "TOO_MANY_WATCHERS",
                 std::to_string(watchers_.size()) + " clients watch already; try again later"));
   }
-  auto stream = PushStream<v1::GetPlanResponse>::New(kMostWaiting);
+  auto stream = PushStream<v1::GetPlanResponse>::New(kMostUpdatesWaiting);
   auto* reactor = stream->Begin();
   Watcher watcher{std::move(stream), std::move(record), std::chrono::duration<double>(period_s), {}};
   if (Tell(watcher, std::chrono::steady_clock::now())) {
