@@ -1,5 +1,7 @@
 #include "clients/cli/answer_table.hpp"
 
+#include <fmt/format.h>
+
 #include <charconv>
 #include <cmath>
 #include <nlohmann/json.hpp>
@@ -27,6 +29,12 @@ nlohmann::json JsonOf(const CsvTable& table) {
 }
 
 }  // namespace
+
+void Append(std::vector<std::string>& cells, double number) { cells.push_back(Shortest(number)); }
+
+std::string Counted(std::size_t rows, std::size_t refused) {
+  return fmt::format("{} rows, {} of them refused", rows, refused);
+}
 
 absl::Status DeliverTable(const CsvTable& table, const std::string& path, const std::string& said,
                           Output& output) {

@@ -62,17 +62,11 @@ Pose ToolPose(const std::array<double, 6>& row) {
   return Pose::FromKrylov({row[0], row[1], row[2]}, {row[3], row[4], row[5]});
 }
 
-void Append(std::vector<std::string>& cells, double number) { cells.push_back(Shortest(number)); }
-
 void AppendReason(std::vector<std::string>& cells, const HexapodInverse& answer) {
   cells.emplace_back(ReasonName(answer.reason));
   cells.emplace_back(answer.bound == HexapodBound::kNone ? "" : BoundName(answer.bound));
   cells.emplace_back(answer.strut < 0 ? "" : std::to_string(answer.strut + 1));
   Append(cells, answer.excess);
-}
-
-std::string Counted(std::size_t rows, std::size_t refused) {
-  return fmt::format("{} rows, {} of them refused", rows, refused);
 }
 
 // Reads machine and poses, lets `fill` write one row a pose; `fill` returns whether it was solved.

@@ -24,9 +24,7 @@ absl::Status Wrong(const char* reason, const std::string& message) {
   return Trouble(absl::StatusCode::kInvalidArgument, reason, message);
 }
 
-void Append(std::vector<std::string>& cells, double number) { cells.push_back(Shortest(number)); }
-
-void Append(std::vector<std::string>& cells, const Vector2d& v) {
+void AppendBoth(std::vector<std::string>& cells, const Vector2d& v) {
   Append(cells, v.x());
   Append(cells, v.y());
 }
@@ -96,10 +94,10 @@ std::vector<std::string> ColumnsOf(const MotionColumns& c, bool moves) {
 }
 
 void AppendMotion(std::vector<std::string>& cells, const Motion& motion, bool moves) {
-  Append(cells, motion.position_mm);
+  AppendBoth(cells, motion.position_mm);
   if (moves) {
-    Append(cells, motion.velocity_mm_per_s);
-    Append(cells, motion.acceleration_mm_per_s2);
+    AppendBoth(cells, motion.velocity_mm_per_s);
+    AppendBoth(cells, motion.acceleration_mm_per_s2);
   }
 }
 
@@ -124,10 +122,6 @@ const std::vector<std::string> kVerdictColumns = {"s1",
                                                   "travel_margin_mm",
                                                   "excess_mm",
                                                   "reason"};
-
-std::string Counted(std::size_t rows, std::size_t refused) {
-  return fmt::format("{} rows, {} of them refused", rows, refused);
-}
 
 // Position, rates and verdict of every row, from one kind of motion to the other.
 template <class SolvePosition, class SolveMotion>
@@ -175,7 +169,7 @@ absl::Status ForEachPose(const PlanarTables& files, std::vector<std::string> col
   std::size_t refused = 0;
   for (const Motion& motion : motions->rows) {
     std::vector<std::string> cells;
-    Append(cells, motion.position_mm);
+    AppendBoth(cells, motion.position_mm);
     refused += fill(*mechanism, motion.position_mm, cells) ? 0 : 1;
     answers.AddRow(std::move(cells));
   }

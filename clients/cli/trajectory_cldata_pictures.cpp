@@ -16,8 +16,8 @@ using trajectory::PilgerProgram;
 using trajectory::ProgramVerification;
 using trajectory::VerifyArgument;
 
-constexpr double kDegPerRad = 180.0 / std::numbers::pi;
-constexpr double kWidth_px = 1500.0;
+constexpr double kShownDegPerRad = 180.0 / std::numbers::pi;
+constexpr double kSheetWidth_px = 1500.0;
 constexpr double kLeft_px = 80.0;
 constexpr double kGap_px = 90.0;
 constexpr double kPanel_px = 240.0;
@@ -37,7 +37,7 @@ double DrawnArgument(const ProgramVerification& v, double argument, bool wraps) 
   if (v.over != VerifyArgument::kTurn) {
     return argument;
   }
-  const double deg = argument * kDegPerRad;
+  const double deg = argument * kShownDegPerRad;
   return wraps ? deg - 360.0 * std::floor((deg + 20.0) / 360.0) : deg;
 }
 
@@ -68,7 +68,7 @@ Axis ArgumentAxis(const ProgramVerification& v, bool wraps) {
     return {v.arguments.front(), v.arguments.back(), "path length, mm"};
   }
   return wraps ? Axis{-20.0, 340.0, "C, deg (turns over each other)"}
-               : Axis{v.arguments.front() * kDegPerRad, v.arguments.back() * kDegPerRad, "C, deg"};
+               : Axis{v.arguments.front() * kShownDegPerRad, v.arguments.back() * kShownDegPerRad, "C, deg"};
 }
 
 }  // namespace
@@ -78,8 +78,8 @@ absl::Status DrawVerification(const ProgramVerification& v, const std::string& p
     return absl::InvalidArgumentError("the program has no motion to draw");
   }
   const double columns = static_cast<double>(v.series.size());
-  const double width = (kWidth_px - kLeft_px - 30.0 - (columns - 1.0) * kGap_px) / columns;
-  Picture picture(kWidth_px, 3.0 * (kPanel_px + 90.0) + 40.0);
+  const double width = (kSheetWidth_px - kLeft_px - 30.0 - (columns - 1.0) * kGap_px) / columns;
+  Picture picture(kSheetWidth_px, 3.0 * (kPanel_px + 90.0) + 40.0);
   const bool wraps = Wraps(v), turn = v.over == VerifyArgument::kTurn;
   for (std::size_t k = 0; k < v.series.size(); ++k) {
     const auto& s = v.series[k];
@@ -112,7 +112,7 @@ Points SectionOf(const PilgerDie& die, double phi) {
   const double a = die.groove.width.At(phi)[0], b = die.groove.depth.At(phi)[0];
   Points points = {{-1.35 * a, 0.0}};
   for (int i = -90; i <= 90; i += 2) {
-    points.push_back({a * std::sin(i / kDegPerRad), -b * std::cos(i / kDegPerRad)});
+    points.push_back({a * std::sin(i / kShownDegPerRad), -b * std::cos(i / kShownDegPerRad)});
   }
   points.push_back({1.35 * a, 0.0});
   return points;
@@ -141,7 +141,7 @@ void DrawSection(Picture& picture, double left_px, const PilgerProgram& program,
   PlotFrame frame(
       picture, {left_px, 40.0, 420.0, 330.0}, {-1.35 * a, 1.35 * a, "x along the die's axis, mm"},
       {-1.15 * b, 1.0 * b, "above the die's cylinder, mm"},
-      "section at " + Fixed(phi * kDegPerRad, 1) + " deg: " + Fixed(a, 2) + " x " + Fixed(b, 2) + " mm",
+      "section at " + Fixed(phi * kShownDegPerRad, 1) + " deg: " + Fixed(a, 2) + " x " + Fixed(b, 2) + " mm",
       true);
   const std::size_t middle = program.passes.size() / 2;
   for (const auto& [pass, colour] : {std::pair{std::size_t{0}, kOrange}, std::pair{middle, kGreen},
@@ -175,7 +175,7 @@ void DrawAxis(Picture& picture, double top_px, const PilgerProgram& program, con
     if (p.c_rad < from - 1e-9 || p.c_rad > to + 1e-9) {
       continue;
     }
-    const std::pair<double, double> at{p.c_rad * kDegPerRad, p.*curve.value * curve.scale};
+    const std::pair<double, double> at{p.c_rad * kShownDegPerRad, p.*curve.value * curve.scale};
     values.push_back(at.second);
     if (pieces.empty() || pieces.back().second != p.cutting) {
       if (!pieces.empty()) {
@@ -186,8 +186,8 @@ void DrawAxis(Picture& picture, double top_px, const PilgerProgram& program, con
     pieces.back().first.push_back(at);
   }
   const auto [low, high] = RangeOf(values);
-  PlotFrame frame(picture, {kLeft_px, top_px, kWidth_px - kLeft_px - 30.0, 190.0},
-                  {from * kDegPerRad, to * kDegPerRad, "C, deg"}, {low, high, ""}, curve.title);
+  PlotFrame frame(picture, {kLeft_px, top_px, kSheetWidth_px - kLeft_px - 30.0, 190.0},
+                  {from * kShownDegPerRad, to * kShownDegPerRad, "C, deg"}, {low, high, ""}, curve.title);
   for (const auto& [points, cutting] : pieces) {
     frame.Line(points, cutting ? kBlue : kOrange, 1.8);
   }
@@ -197,14 +197,14 @@ void DrawAxis(Picture& picture, double top_px, const PilgerProgram& program, con
 }  // namespace
 
 absl::Status DrawPilger(const PilgerProgram& program, const PilgerDie& die, const std::string& path) {
-  Picture picture(kWidth_px, 1250.0);
+  Picture picture(kSheetWidth_px, 1250.0);
   DrawSection(picture, kLeft_px, program, die, 0.0);
   DrawSection(picture, kLeft_px + 490.0, program, die, 0.5 * die.groove.zone_rad);
   DrawSection(picture, kLeft_px + 980.0, program, die, die.groove.zone_rad);
   const std::array<AxisCurve, 3> curves = {
       {{"X of the wheel's centre, mm", &trajectory::GrindingPoint::x_mm, 1.0},
        {"Z of the wheel's centre, mm", &trajectory::GrindingPoint::z_mm, 1.0},
-       {"A of the wheel, deg", &trajectory::GrindingPoint::a_rad, kDegPerRad}}};
+       {"A of the wheel, deg", &trajectory::GrindingPoint::a_rad, kShownDegPerRad}}};
   for (std::size_t k = 0; k < curves.size(); ++k) {
     DrawAxis(picture, 460.0 + 265.0 * static_cast<double>(k), program, curves[k]);
   }

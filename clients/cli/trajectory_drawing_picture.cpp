@@ -16,7 +16,7 @@ using trajectory::Finding;
 using trajectory::Piece;
 using trajectory::Pieces;
 
-constexpr double kWidth_px = 1620.0;
+constexpr double kDrawingWidth_px = 1620.0;
 constexpr double kPlanWidth_px = 1180.0;
 constexpr double kDetail_px = 400.0;
 constexpr Colour kWhite{1.0, 1.0, 1.0};
@@ -109,7 +109,7 @@ void DrawDetail(Picture& picture, const trajectory::ContourSet& contours,
                 const trajectory::Toolpath& toolpath, const Eigen::Vector2d& at, double half_mm,
                 const std::string& title) {
   constexpr int kPointsAcross = 1500;
-  PlotFrame frame(picture, {kWidth_px - kDetail_px - 20.0, 40.0, kDetail_px, kDetail_px},
+  PlotFrame frame(picture, {kDrawingWidth_px - kDetail_px - 20.0, 40.0, kDetail_px, kDetail_px},
                   {at.x() - half_mm, at.x() + half_mm, "x in W, mm"},
                   {at.y() - half_mm, at.y() + half_mm, ""}, title, true);
   Box window;
@@ -178,7 +178,7 @@ Box BoxOfAll(const trajectory::ContourSet& contours, const trajectory::Toolpath&
 
 absl::Status DrawToolpath(const trajectory::ContourSet& contours, const trajectory::Toolpath& toolpath,
                           const trajectory::ToolpathOptions& options, const std::string& path) {
-  Picture picture(kWidth_px, kHeight_px);
+  Picture picture(kDrawingWidth_px, kHeight_px);
   const Box box = BoxOfAll(contours, toolpath);
   const Eigen::Vector2d margin = Eigen::Vector2d::Constant(0.04 * (box.high_mm - box.low_mm).maxCoeff());
   const Eigen::Vector2d low = box.low_mm - margin, high = box.high_mm + margin;

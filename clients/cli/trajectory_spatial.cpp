@@ -26,7 +26,7 @@ using trajectory::SpatialPlanSample;
 using trajectory::StrutsAt;
 
 constexpr double kDeg = 180.0 / M_PI;
-constexpr double kWidth_px = 1300.0;
+constexpr double kSpatialWidth_px = 1300.0;
 constexpr double kRoomForLegend = 1.09;  // of the time axis, so that names stand beside the curves
 constexpr std::size_t kMostCurvePoints = 4000;
 constexpr std::array<Colour, kStrutCount> kStrutColours = {kBlue, kOrange, kGreen, kRed, kViolet, kInk};
@@ -267,7 +267,7 @@ void DrawStruts(Picture& picture, double top_px, const PlannedSpatialProgram& p,
     }
   }
   const double room = 0.05 * (high - low) + 1e-9;
-  PlotFrame frame(picture, {80.0, top_px, kWidth_px - 120.0, 190.0},
+  PlotFrame frame(picture, {80.0, top_px, kSpatialWidth_px - 120.0, 190.0},
                   {0.0, kRoomForLegend * p.plan.duration_s, "program time, s"},
                   {low - room, high + room, label}, title);
   std::vector<std::pair<std::string, Colour>> legend;
@@ -279,7 +279,7 @@ void DrawStruts(Picture& picture, double top_px, const PlannedSpatialProgram& p,
 }
 
 void DrawAll(Picture& picture, const PlannedSpatialProgram& p, const HexapodMotion& m, bool by_speed) {
-  DrawPathFrame(picture, {80.0, 50.0, kWidth_px - 120.0, 560.0}, p, by_speed);
+  DrawPathFrame(picture, {80.0, 50.0, kSpatialWidth_px - 120.0, 560.0}, p, by_speed);
   DrawStruts(picture, 680.0, p, "what the struts' encoders read", "mm",
              [](const trajectory::StrutState& s) { return s.q_mm; });
   DrawStruts(picture, 960.0, p, fmt::format("strut speeds (limit {:.0f} mm/s)", m.strut_velocity_mm_per_s),
@@ -300,7 +300,7 @@ void DrawErrors(Picture& picture, double top_px, double duration_s,
     drives.push_back({at.tau_s, 1e3 * at.drives_tip_error_mm});
     high = std::max({high, 1e3 * at.tip_error_mm, 1e3 * at.drives_tip_error_mm});
   }
-  PlotFrame frame(picture, {80.0, top_px, kWidth_px - 120.0, 190.0},
+  PlotFrame frame(picture, {80.0, top_px, kSpatialWidth_px - 120.0, 190.0},
                   {0.0, kRoomForLegend * duration_s, "program time, s"}, {0.0, 1.1 * high, "\u00b5m"},
                   "tip from the programmed path: as the plan says, and as simulated drives follow");
   frame.Line(drives, kOrange, 1.0);
@@ -406,7 +406,7 @@ absl::Status DrawSpatial(const SpatialVerb& verb, Output& output) {
   if (!answer.ok() || !answer->has_value()) {
     return answer.status();
   }
-  Picture picture(kWidth_px, 1500.0);
+  Picture picture(kSpatialWidth_px, 1500.0);
   DrawAll(picture, **answer, machine.motion, verb.colour == "speed");
   return picture.Write(verb.out);
 }
@@ -427,7 +427,7 @@ absl::Status PlaySpatial(const SpatialVerb& verb, Output& output) {
   if (verb.out.empty()) {
     return absl::OkStatus();
   }
-  Picture picture(kWidth_px, 1780.0);
+  Picture picture(kSpatialWidth_px, 1780.0);
   DrawAll(picture, **answer, machine.motion, verb.colour == "speed");
   DrawErrors(picture, 1520.0, (*answer)->plan.duration_s, played);
   return picture.Write(verb.out);

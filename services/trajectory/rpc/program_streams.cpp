@@ -8,12 +8,12 @@
 #include "trajectory/core/feed/plan_samples.hpp"
 #include "trajectory/core/part_program/cldata_writer.hpp"
 #include "trajectory/core/toolpath/program_text.hpp"
+#include "trajectory/rpc/answer_limits.hpp"
 
 namespace lambdajet::trajectory {
 namespace {
 
 constexpr std::size_t kOperationsPerBatch = 5000;
-constexpr std::size_t kBytesPerPiece = 256u << 10;
 constexpr const char* kSampleHeader =
     "tau_s,s_mm,x_W_mm,y_W_mm,vx_W_mm_per_s,vy_W_mm_per_s,ax_W_mm_per_s2,ay_W_mm_per_s2,"
     "actuator_1_mm,actuator_2_mm,actuator_1_mm_per_s,actuator_2_mm_per_s,cutting,source_line\n";

@@ -5,13 +5,12 @@
 #include <cstdio>
 
 #include "platform/rpc/argument_checks.hpp"
+#include "trajectory/rpc/answer_limits.hpp"
 #include "trajectory/rpc/wire.hpp"
 
 namespace lambdajet::trajectory {
 namespace {
 
-constexpr std::size_t kMostSlowStretches = 200;
-constexpr std::size_t kBytesPerPiece = 256u << 10;
 constexpr std::size_t kStride = 22;
 constexpr const char* kHeader =
     "tau_s,s_mm,x_W_mm,y_W_mm,z_W_mm,a_rad,b_rad,c_rad,tip_mm_per_s,path_mm_per_s,strut_1_mm,strut_2_mm,"

@@ -2,6 +2,7 @@
 
 #include "platform/rpc/argument_checks.hpp"
 #include "trajectory/core/feed/plan_samples.hpp"
+#include "trajectory/rpc/answer_limits.hpp"
 #include "trajectory/rpc/spatial_wire.hpp"
 
 namespace lambdajet::trajectory {
@@ -10,7 +11,6 @@ namespace {
 constexpr double kLeastTolerance_mm = 1e-3;
 constexpr double kMostTolerance_mm = 10.0;
 constexpr std::size_t kMostTolerances = 1000;
-constexpr std::size_t kMostSlowStretches = 200;
 
 std::string Word(std::string_view text) { return std::string(text); }
 
