@@ -2,7 +2,9 @@
 // and answers only.
 #include <cmath>
 #include <fstream>
+#include <functional>
 #include <limits>
+#include <set>
 #include <sstream>
 
 #include "tests/rpc/trajectory_service_fixture.hpp"
@@ -162,6 +164,230 @@ TEST_F(TrajectoryServiceTest, ExportsAPlansPoints) {
   EXPECT_EQ(csv.rfind("tau_s,s_mm,x_W_mm", 0), 0u);
   EXPECT_NEAR(static_cast<double>(std::count(csv.begin(), csv.end(), '\n')),
               plan.summary().duration_s() / 0.01 + 2, 1.5);
+}
+
+std::string Shipped(const std::string& name) {
+  std::ostringstream text;
+  text << std::ifstream(test::SourceDir() + "/deploy/parts/" + name).rdbuf();
+  EXPECT_FALSE(text.str().empty()) << name;
+  return text.str();
+}
+
+// A program in one of the formats, with what a drawing needs to be cut.
+struct Written {
+  std::string text;
+  type::v1::ProgramFormat format = type::v1::PROGRAM_FORMAT_UNSPECIFIED;
+
+  template <typename Request>
+  void Fill(Request& request) const {
+    request.set_program(text);
+    if constexpr (std::is_same_v<Request, v1::ExportRequest>) {
+      request.set_program_format(format);
+    } else {
+      request.set_format(format);
+    }
+    if (format == type::v1::PROGRAM_FORMAT_DXF) {
+      request.mutable_toolpath()->add_ignore_layers("CENTRE");
+      request.mutable_toolpath()->set_lead_mm(6.0);
+    }
+  }
+};
+
+// An operation's kind and numbers, of those that are the same in every notation; modes and the source's lines are not.
+struct Canonical {
+  std::string kind;
+  std::vector<std::pair<std::string, double>> numbers;
+};
+
+std::vector<Canonical> CanonicalOf(const std::string& listing) {
+  static const std::set<std::string> kModes = {"UNITS_CHANGE", "DISTANCE_CHANGE", "WORK_OFFSET_CHANGE",
+                                               "FEED_CHANGE"};
+  std::vector<Canonical> operations;
+  std::istringstream lines(listing);
+  for (std::string line; std::getline(lines, line);) {
+    std::istringstream words(line);
+    Canonical operation;
+    std::string source_line;
+    words >> source_line >> operation.kind;
+    for (std::string word; words >> word;) {
+      const std::size_t sign = word.find('=');
+      if (sign != std::string::npos) {
+        operation.numbers.emplace_back(word.substr(0, sign), std::stod(word.substr(sign + 1)));
+      }
+    }
+    if (kModes.count(operation.kind) == 0) {
+      operations.push_back(std::move(operation));
+    }
+  }
+  return operations;
+}
+
+void ExpectSame(const std::vector<Canonical>& a, const std::vector<Canonical>& b, double tolerance) {
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    ASSERT_EQ(a[i].kind, b[i].kind) << i;
+    ASSERT_EQ(a[i].numbers.size(), b[i].numbers.size()) << i << " " << a[i].kind;
+    for (std::size_t k = 0; k < a[i].numbers.size(); ++k) {
+      ASSERT_EQ(a[i].numbers[k].first, b[i].numbers[k].first) << i << " " << a[i].kind;
+      ASSERT_NEAR(a[i].numbers[k].second, b[i].numbers[k].second, tolerance)
+          << i << " " << a[i].kind << " " << a[i].numbers[k].first;
+    }
+  }
+}
+
+const std::vector<Written>& ProgramsInAllFormats() {
+  static const std::vector<Written> programs = {
+      {kPlate},
+      {Shipped("cover/cover.ngc"), type::v1::PROGRAM_FORMAT_GCODE},
+      {Shipped("cover/cover.cldata"), type::v1::PROGRAM_FORMAT_CLDATA},
+      {Shipped("cover/cover.dxf"), type::v1::PROGRAM_FORMAT_DXF},
+      {Shipped("bracket.ngc"), type::v1::PROGRAM_FORMAT_GCODE},
+      {"G20 G90 G64 P0.001\nG0 X8 Y8\nM3\nG93 G1 X9 F40\nG2 X10 Y8 I0.5 J0 F30\nG94 G1 X10.5 "
+       "F100\nG61\nM5\nG4 "
+       "P0.2\nG0 X12\nM62 P0\nG91 G1 X1\nM63 P0\nM100 P2\nM2\n"}};
+  return programs;
+}
+
+TEST_F(TrajectoryServiceTest, WhatIsWrittenOutReadsBackTheSame) {
+  const auto exported = [this](const Written& program, v1::ExportRequest::Format as) {
+    v1::ExportRequest request;
+    program.Fill(request);
+    request.set_format(as);
+    std::string text;
+    const absl::Status status = ExportAll(request, text);
+    EXPECT_TRUE(status.ok()) << status;
+    return text;
+  };
+  for (std::size_t i = 0; i < ProgramsInAllFormats().size(); ++i) {
+    const Written& program = ProgramsInAllFormats()[i];
+    const auto wanted = CanonicalOf(exported(program, v1::ExportRequest::FORMAT_CANONICAL));
+    ASSERT_GT(wanted.size(), 5u);
+    for (const auto& [as, format] :
+         {std::pair{v1::ExportRequest::FORMAT_GCODE, type::v1::PROGRAM_FORMAT_GCODE},
+          std::pair{v1::ExportRequest::FORMAT_CLDATA, type::v1::PROGRAM_FORMAT_CLDATA}}) {
+      SCOPED_TRACE("program " + std::to_string(i) + " as " + v1::ExportRequest::Format_Name(as));
+      const Written written{exported(program, as), format};
+      ExpectSame(wanted, CanonicalOf(exported(written, v1::ExportRequest::FORMAT_CANONICAL)), 2e-6);
+      EXPECT_EQ(exported(written, as), written.text) << "written again it is the same text";
+    }
+  }
+}
+
+TEST_F(TrajectoryServiceTest, APlanWrittenOutIsPlannedTheSame) {
+  for (const Written& program : ProgramsInAllFormats()) {
+    v1::PlanProgramRequest request;
+    program.Fill(request);
+    const auto plan = PlanAndWait(request);
+    ASSERT_EQ(plan.operation().state(), type::v1::OPERATION_STATE_DONE) << plan.DebugString();
+    for (const auto as : {v1::ExportRequest::FORMAT_GCODE, v1::ExportRequest::FORMAT_CLDATA}) {
+      v1::ExportRequest file;
+      file.set_plan_id(plan.summary().plan_id());
+      file.set_format(as);
+      std::string text;
+      ASSERT_TRUE(ExportAll(file, text).ok());
+      const auto again = PlanAndWait(text);
+      EXPECT_NEAR(again.summary().duration_s(), plan.summary().duration_s(),
+                  2e-5 * plan.summary().duration_s());
+      EXPECT_NEAR(again.summary().cutting_length_mm(), plan.summary().cutting_length_mm(), 1e-4);
+      EXPECT_EQ(again.summary().gate_count(), plan.summary().gate_count());
+      EXPECT_EQ(again.summary().event_count(), plan.summary().event_count());
+    }
+  }
+}
+
+TEST_F(TrajectoryServiceTest, APlanOfALargeProgramIsNotKeptAsText) {
+  std::string program;
+  while (program.size() <= PlanDesk::kMostKeptBytes) {
+    program += "(" + std::string(60, 'x') + ")\n";
+  }
+  const auto plan = PlanAndWait(program + kPlate);
+  ASSERT_EQ(plan.operation().state(), type::v1::OPERATION_STATE_DONE) << plan.DebugString();
+  v1::ExportRequest file;
+  file.set_plan_id(plan.summary().plan_id());
+  file.set_format(v1::ExportRequest::FORMAT_GCODE);
+  std::string text;
+  EXPECT_EQ(TroubleReason(ExportAll(file, text)), "PROGRAM_NOT_KEPT");
+}
+
+TEST_F(TrajectoryServiceTest, ADrawingThatCannotBeCutIsRefusedWithItsLines) {
+  Written open{Shipped("cover/cover.dxf"),
+               type::v1::PROGRAM_FORMAT_DXF};  // its centre lines are open contours
+  v1::PlanProgramRequest request;
+  open.Fill(request);
+  request.mutable_toolpath()->clear_ignore_layers();
+  const auto plan = PlanAndWait(request);
+  EXPECT_EQ(plan.operation().state(), type::v1::OPERATION_STATE_FAILED);
+  ASSERT_GT(plan.faults_size(), 0);
+  EXPECT_EQ(plan.operation().reason(), plan.faults(0).reason());
+  EXPECT_GT(plan.faults(0).line(), 0u);
+  EXPECT_NE(plan.faults(0).message().find("CENTRE"), std::string::npos) << plan.faults(0).message();
+  v1::AdmitProgramRequest admit;
+  open.Fill(admit);
+  admit.mutable_toolpath()->clear_ignore_layers();
+  absl::Status status;
+  const auto steps = Steps(admit, status);
+  ASSERT_TRUE(status.ok()) << status;
+  EXPECT_EQ(steps.back().step(), "PARSE");
+  EXPECT_EQ(steps.back().state(), Step::STATE_REFUSED);
+  EXPECT_EQ(steps.back().faults(0).reason(), plan.faults(0).reason());
+}
+
+TEST_F(TrajectoryServiceTest, AKerfThatIsNotGivenIsTheMachines) {
+  Written drawing{Shipped("cover/cover.dxf"), type::v1::PROGRAM_FORMAT_DXF};
+  const auto plan_id = [&](std::optional<double> kerf_mm) {
+    v1::PlanProgramRequest request;
+    drawing.Fill(request);
+    if (kerf_mm) {
+      request.mutable_toolpath()->set_kerf_mm(*kerf_mm);
+    }
+    v1::PlanProgramResponse response;
+    EXPECT_TRUE(Call(&Stub::PlanProgram, *stub_, request, response).ok());
+    return response.plan_id();
+  };
+  EXPECT_EQ(plan_id(std::nullopt), plan_id(machine_->process.kerf_width_mm));
+  EXPECT_NE(plan_id(std::nullopt), plan_id(1.0));
+}
+
+TEST_F(TrajectoryServiceTest, WatchesAPlanToItsEnd) {
+  const auto watched = [this](std::uint64_t plan_id, const std::function<void(int)>& after) {
+    grpc::ClientContext context;
+    SetDeadline(context, 60.0);
+    v1::WatchPlanRequest request;
+    request.set_plan_id(plan_id);
+    request.set_period_s(0.02);
+    const auto stream = stub_->WatchPlan(&context, request);
+    std::vector<v1::GetPlanResponse> told;
+    for (v1::GetPlanResponse plan; stream->Read(&plan);) {
+      told.push_back(plan);
+      after(static_cast<int>(told.size()));
+    }
+    EXPECT_TRUE(stream->Finish().ok());
+    return told;
+  };
+  v1::PlanProgramRequest request;
+  request.set_program(kPlate);
+  request.mutable_options()->set_tolerance_mm(0.1);
+  v1::PlanProgramResponse asked;
+  ASSERT_TRUE(Call(&Stub::PlanProgram, *stub_, request, asked).ok());
+  const auto told = watched(asked.plan_id(), [](int) {});
+  ASSERT_GE(told.size(), 3u) << "some twenty plans have steps to tell";
+  for (std::size_t i = 1; i < told.size(); ++i) {
+    EXPECT_GE(told[i].operation().progress(), told[i - 1].operation().progress());
+    EXPECT_EQ(told[i - 1].operation().state(), type::v1::OPERATION_STATE_RUNNING);
+  }
+  EXPECT_EQ(told.back().operation().state(), type::v1::OPERATION_STATE_DONE);
+  EXPECT_EQ(told.back().summary().plan_id(), asked.plan_id());
+  EXPECT_EQ(watched(asked.plan_id(), [](int) {}).size(), 1u) << "an ended plan is told once";
+
+  request.mutable_options()->set_tolerance_mm(0.09);
+  ASSERT_TRUE(Call(&Stub::PlanProgram, *stub_, request, asked).ok());
+  v1::CancelPlanRequest cancel;
+  cancel.set_plan_id(asked.plan_id());
+  const auto cancelled = watched(asked.plan_id(), [&](int count) {
+    v1::CancelPlanResponse response;
+    EXPECT_TRUE(count > 1 || Call(&Stub::CancelPlan, *stub_, cancel, response).ok());
+  });
+  EXPECT_EQ(cancelled.back().operation().state(), type::v1::OPERATION_STATE_CANCELLED);
 }
 
 TEST_F(TrajectoryServiceTest, RefusesWhatNoOptionMayBe) {

@@ -75,6 +75,10 @@ class TrajectoryServiceTest : public testing::Test {
     v1::PlanProgramRequest request;
     request.set_program(program);
     *request.mutable_options() = options;
+    return PlanAndWait(request);
+  }
+
+  v1::GetPlanResponse PlanAndWait(const v1::PlanProgramRequest& request) {
     v1::PlanProgramResponse asked;
     const absl::Status status = Call(&Stub::PlanProgram, *stub_, request, asked);
     EXPECT_TRUE(status.ok()) << status;

@@ -92,7 +92,7 @@ void PlanDesk::Work(const std::shared_ptr<PlanRecord>& record) {
   if (!record->cancel) {
     TolerancePlan answer =
         PlanToTolerance(record->program, *record->machine, record->options, [&record](double progress) {
-          record->progress = 0.9 * progress;
+          record->progress = std::max(record->progress.load(), 0.9 * progress);  // a search may begin anew
           return !record->cancel;
         });
     *planned = std::move(answer.planned);

@@ -23,6 +23,7 @@ constexpr int kPointsPerBatch = 2000;
 constexpr double kDefaultStep_s = 0.004;
 constexpr double kDefaultPeriod_s = 0.1;
 constexpr int kDefaultPage = 20;
+constexpr std::size_t kLongestToken = 19;  // digits that fit into 64 bits
 constexpr std::size_t kMostStepsWaiting = 64;
 
 absl::Status UnknownPlan(std::uint64_t id) {
@@ -217,8 +218,9 @@ grpc::ServerUnaryReactor* TrajectoryRpc::ListPlans(grpc::CallbackServerContext* 
   return Answer(context, [&]() -> absl::Status {
     ArgumentChecks checks;
     checks.InRange("page_size", request->page_size(), 0, 100);
-    checks.Require(request->page_token().find_first_not_of("0123456789") == std::string::npos, "page_token",
-                   "BAD_TOKEN", "must come from an earlier answer");
+    checks.Require(request->page_token().size() <= kLongestToken &&
+                       request->page_token().find_first_not_of("0123456789") == std::string::npos,
+                   "page_token", "BAD_TOKEN", "must come from an earlier answer");
     if (!checks.ok()) {
       return checks.status();
     }
