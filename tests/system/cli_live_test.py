@@ -150,12 +150,16 @@ class EveryVerb(unittest.TestCase):
         exported = run("trajectory", "export", "--plan", plan, "--step-s", 0.05)
         self.assertEqual(len(exported.splitlines()), len(samples.splitlines()))
         self.assertIn("PIERCE", run("trajectory", "export", "--program", part))
+        self.assertIn("M3", run("trajectory", "export", "--program", part, "--as", "gcode"))
+        self.assertIn("AUXFUN/3,0.6", run("trajectory", "export", "--plan", plan, "--as", "cldata"))
+        self.assertEqual(ask("trajectory", "watch", plan)[1]["summary"]["plan_id"], plan)
         people = run("trajectory", "admit", part, "--tolerance-mm", 5, "--tolerance-contour", "1=4")
         for step in ("PARSE", "PLACE", "REACH", "LIMITS", "TIME", "ACCURACY"):
             self.assertRegex(people, f"{step} +passed")
         steps = [json.loads(line) for line in run("--json", "trajectory", "admit", part).splitlines()]
         self.assertEqual(steps[-1]["step"], "ACCURACY")
         run("trajectory", "show", 7, code=REFUSED)
+        run("trajectory", "watch", 7, code=REFUSED)
         run("trajectory", "export", "--plan", 7, code=REFUSED)
 
     def test_trajectory_of_a_hexapod(self):
