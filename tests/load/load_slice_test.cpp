@@ -1,4 +1,4 @@
-// A few seconds of both loads on real processes: no errors, and the reports are there. Says nothing about speed.
+// A few seconds of each load on real processes: no errors, and the reports are there. Says nothing about speed.
 #include <gtest/gtest.h>
 
 #include <fstream>
@@ -70,6 +70,16 @@ TEST_F(LoadSlice, ACamSystemThatSolvesBatchesHasNoErrors) {
   const auto ready = kinematics.WaitUntilReady();
   ASSERT_TRUE(ready) << kinematics.err() << calibration.err();
   RunLoad("cam", ready->rpc_port, "50");
+}
+
+TEST_F(LoadSlice, ProgrammersWhoPlanHaveNoErrors) {
+  ChildProcess calibration(
+      Process("calibration", {"--store=" + folder.File("calibration.sqlite"),
+                              "--machine=" + test::SourceDir() + "/deploy/config/machine.yaml"}));
+  ChildProcess trajectory(Process("trajectory"));
+  const auto ready = trajectory.WaitUntilReady();
+  ASSERT_TRUE(ready) << trajectory.err() << calibration.err();
+  RunLoad("plans", ready->rpc_port, "20");
 }
 
 }  // namespace

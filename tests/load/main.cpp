@@ -4,6 +4,7 @@
 #include <CLI/Formatter.hpp>
 #include <cstdio>
 #include <fstream>
+#include <functional>
 
 #include "platform/rpc/channel.hpp"
 #include "tests/load/load_report.hpp"
@@ -38,16 +39,17 @@ void AddOptions(CLI::App& scenario, Options& options) {
   scenario.add_option("--json", options.json, "the same figures for programs");
 }
 
+using Scenario = std::function<absl::StatusOr<load::Measured>(const load::Channels&)>;
+
 // 0: no errors; 1: some questions had trouble; 3: the scenario could not begin.
-int Run(const Options& options, bool mes) {
+int Run(const Options& options, const Scenario& scenario) {
   load::Channels channels;
   for (int i = 0; i < options.connections; ++i) {
     ChannelOptions channel;
     channel.address = options.address;
     channels.push_back(OpenChannel(channel).value_or(nullptr));
   }
-  const auto measured = mes ? load::RunMesPolling(channels, options.pace, options.watchers)
-                            : load::RunCamBatches(channels, options.pace, options.batch_poses);
+  const auto measured = scenario(channels);
   if (!measured.ok()) {
     std::fprintf(stderr, "lambdajet_load: %s\n", measured.status().ToString().c_str());
     return 3;
@@ -72,8 +74,11 @@ int main(int count, char** words) {
   app.require_subcommand(1);
   CLI::App* mes = app.add_subcommand("mes", "a MES that polls jobs while people watch, on the cell");
   CLI::App* cam = app.add_subcommand("cam", "a CAM system that solves poses in batches, on kinematics");
-  AddOptions(*mes, options);
-  AddOptions(*cam, options);
+  CLI::App* plans =
+      app.add_subcommand("plans", "programs admitted, planned, listed and sampled, on trajectory");
+  for (CLI::App* scenario : {mes, cam, plans}) {
+    AddOptions(*scenario, options);
+  }
   mes->add_option("--watchers", options.watchers, "open WatchJobs streams")
       ->check(CLI::Range(0, 500))
       ->capture_default_str();
@@ -81,5 +86,9 @@ int main(int count, char** words) {
       ->check(CLI::Range(1, 65536))
       ->capture_default_str();
   CLI11_PARSE(app, count, words);
-  return Run(options, mes->parsed());
+  return Run(options, [&](const load::Channels& channels) {
+    return mes->parsed()   ? load::RunMesPolling(channels, options.pace, options.watchers)
+           : cam->parsed() ? load::RunCamBatches(channels, options.pace, options.batch_poses)
+                           : load::RunPlanning(channels, options.pace);
+  });
 }

@@ -10,6 +10,7 @@
 #include "foundation/contract/trouble.hpp"
 #include "lambdajet/cell/v1/cell.grpc.pb.h"
 #include "lambdajet/kinematics/v1/kinematics.grpc.pb.h"
+#include "lambdajet/trajectory/v1/trajectory.grpc.pb.h"
 #include "platform/rpc/channel.hpp"
 
 namespace lambdajet::load {
@@ -17,8 +18,10 @@ namespace {
 
 namespace cell_wire = cell::v1;
 namespace kinematics_wire = kinematics::v1;
+namespace trajectory_wire = trajectory::v1;
 using cell_wire::CellService;
 using kinematics_wire::KinematicsService;
+using trajectory_wire::TrajectoryService;
 using Answered = std::function<void(const absl::Status&)>;
 
 constexpr double kQuestionDeadline_s = 10.0;
@@ -86,6 +89,185 @@ class Watchers {
   std::atomic<std::uint64_t> broken_ = 0;
 };
 
+// A plate with a bore, small enough that planning it takes some hundredths of a second.
+constexpr const char* kPlate =
+    "G21 G90 G17\nF3600\nG0 X300 Y300\nM3 P0.3\nG1 X309.6\nG3 X309.6 Y300 I-9.6 J0\nM5\nG0 X262 Y300\nM3 "
+    "P0.3\nG1 X269.6 Y300\n"
+    "G1 Y320\nG2 X270 Y320.4 I0.4 J0\nG1 X330\nG2 X330.4 Y320 I0 J-0.4\nG1 Y280\nG2 X330 Y279.6 I-0.4 J0\nG1 "
+    "X270\n"
+    "G2 X269.6 Y280 I0 J0.4\nG1 Y301\nM5\nM2\n";
+
+// Reads a stream to its end; lives until then.
+template <typename Request, typename Message>
+class StreamAsked final : public grpc::ClientReadReactor<Message> {
+ public:
+  using Look = std::function<void(const Message&)>;
+
+  template <typename Open>
+  static void Start(Request request, Answered answered, Look look, Open&& open) {
+    auto* stream = new StreamAsked(std::move(request), std::move(answered), std::move(look));
+    SetDeadline(stream->context_, kQuestionDeadline_s);
+    open(&stream->context_, &stream->request_, stream);
+    stream->StartRead(&stream->message_);
+    stream->StartCall();
+  }
+  void OnReadDone(bool ok) override {
+    if (ok) {
+      look_(message_);
+      this->StartRead(&message_);
+    }
+  }
+  void OnDone(const grpc::Status& status) override {
+    answered_(status.ok() ? absl::OkStatus() : FromWire(status));
+    delete this;
+  }
+
+ private:
+  StreamAsked(Request request, Answered answered, Look look)
+      : request_(std::move(request)), answered_(std::move(answered)), look_(std::move(look)) {}
+
+  grpc::ClientContext context_;
+  Request request_;
+  Message message_;
+  Answered answered_;
+  Look look_;
+};
+
+// What the questions about programs share; held by every question on its way, as the run may end before the last answer.
+class Planning : public std::enable_shared_from_this<Planning> {
+ public:
+  explicit Planning(const Channels& channels) {
+    for (const auto& channel : channels) {
+      stubs_.push_back(TrajectoryService::NewStub(channel));
+    }
+  }
+
+  // Admits the program and makes the first plan.
+  absl::Status Begin() {
+    trajectory_wire::AdmitProgramRequest request;
+    request.set_program(kPlate);
+    trajectory_wire::AdmitProgramResponse admitted;
+    absl::Status status = Call(&TrajectoryService::Stub::AdmitProgram, *stubs_.front(), request, admitted);
+    if (status.ok() && !admitted.admitted()) {
+      return Trouble(absl::StatusCode::kFailedPrecondition, "PROGRAM_REFUSED", admitted.ShortDebugString());
+    }
+    trajectory_wire::PlanProgramResponse planned;
+    status.Update(Call(&TrajectoryService::Stub::PlanProgram, *stubs_.front(), PlanRequest(0), planned));
+    grpc::ClientContext context;
+    trajectory_wire::WatchPlanRequest watch;
+    watch.set_plan_id(planned.plan_id());
+    const auto stream = stubs_.front()->WatchPlan(&context, watch);
+    for (trajectory_wire::GetPlanResponse plan; stream->Read(&plan);) {
+      newest_ = plan.has_summary() ? plan.summary().plan_id() : newest_.load();
+    }
+    status.Update(FromWire(stream->Finish()));
+    return status.ok() && newest_ == 0
+               ? Trouble(absl::StatusCode::kFailedPrecondition, "NOT_PLANNED", "the first plan has failed")
+               : status;
+  }
+
+  void Ask(std::uint64_t n, Answered answered) {
+    auto* stub = stubs_[n % stubs_.size()]->async();
+    switch (n % 10) {
+      case 2:
+      case 7:
+        return List(*stub, std::move(answered));
+      case 3:
+      case 8:
+        return Sample(*stub, std::move(answered));
+      case 4:
+      case 9:
+        return Plan(*stub, n, std::move(answered));
+      default:
+        return Admit(*stub, std::move(answered));
+    }
+  }
+
+  double points() const { return static_cast<double>(points_); }
+  double plans() const { return static_cast<double>(plans_); }
+
+ private:
+  using Async = class TrajectoryService::Stub::async;
+
+  // Every n its own feed, so its own plan.
+  static trajectory_wire::PlanProgramRequest PlanRequest(std::uint64_t n) {
+    trajectory_wire::PlanProgramRequest request;
+    request.set_program(kPlate);
+    request.mutable_options()->set_feed_scale(1.0 - 1e-6 * static_cast<double>(n % 500'000));
+    return request;
+  }
+
+  static absl::Status Wrong(const char* what) {
+    return Trouble(absl::StatusCode::kInternal, "WRONG_ANSWER", what);
+  }
+
+  void Admit(Async& stub, Answered answered) {
+    trajectory_wire::AdmitProgramRequest request;
+    request.set_program(kPlate);
+    load::Ask<trajectory_wire::AdmitProgramRequest, trajectory_wire::AdmitProgramResponse>(
+        request, std::move(answered), [&stub](auto... arguments) { stub.AdmitProgram(arguments...); },
+        [](const auto& response) { return response.admitted() ? absl::OkStatus() : Wrong("not admitted"); });
+  }
+
+  void List(Async& stub, Answered answered) {
+    trajectory_wire::ListOperationsRequest request;
+    request.set_program(kPlate);
+    load::Ask<trajectory_wire::ListOperationsRequest, trajectory_wire::ListOperationsResponse>(
+        request, std::move(answered), [&stub](auto... arguments) { stub.ListOperations(arguments...); },
+        [](const auto& response) {
+          return response.operations_size() > 10 ? absl::OkStatus() : Wrong("operations are missing");
+        });
+  }
+
+  void Sample(Async& stub, Answered answered) {
+    trajectory_wire::StreamSamplesRequest request;
+    request.set_plan_id(newest_);
+    StreamAsked<trajectory_wire::StreamSamplesRequest, trajectory_wire::SampleBatch>::Start(
+        request, std::move(answered),
+        [self = shared_from_this()](const auto& batch) {
+          self->points_ += static_cast<std::uint64_t>(batch.cutting_size());
+        },
+        [&stub](auto... arguments) { stub.StreamSamples(arguments...); });
+  }
+
+  void Plan(Async& stub, std::uint64_t n, Answered answered) {
+    auto asked =
+        std::make_shared<Asked<trajectory_wire::PlanProgramRequest, trajectory_wire::PlanProgramResponse>>();
+    asked->request = PlanRequest(n);
+    SetDeadline(asked->context, kQuestionDeadline_s);
+    stub.PlanProgram(&asked->context, &asked->request, &asked->response,
+                     [self = shared_from_this(), &stub, asked,
+                      answered = std::move(answered)](const grpc::Status& status) {
+                       status.ok() ? self->Watch(stub, asked->response.plan_id(), answered)
+                                   : answered(FromWire(status));
+                     });
+  }
+
+  void Watch(Async& stub, std::uint64_t plan_id, Answered answered) {
+    trajectory_wire::WatchPlanRequest request;
+    request.set_plan_id(plan_id);
+    auto done = std::make_shared<bool>(false);
+    StreamAsked<trajectory_wire::WatchPlanRequest, trajectory_wire::GetPlanResponse>::Start(
+        request,
+        [answered = std::move(answered), done](const absl::Status& status) {
+          answered(status.ok() && !*done ? Wrong("the plan has failed") : status);
+        },
+        [self = shared_from_this(), done](const auto& plan) {
+          if (plan.has_summary()) {
+            *done = true;
+            self->newest_ = plan.summary().plan_id();
+            ++self->plans_;
+          }
+        },
+        [&stub](auto... arguments) { stub.WatchPlan(arguments...); });
+  }
+
+  std::vector<std::unique_ptr<TrajectoryService::Stub>> stubs_;
+  std::atomic<std::uint64_t> newest_ = 0;
+  std::atomic<std::uint64_t> points_ = 0;
+  std::atomic<std::uint64_t> plans_ = 0;
+};
+
 // A job to ask about: one that is there, or one submitted for it, which needs no machine.
 absl::StatusOr<std::string> AnyJob(CellService::Stub& stub) {
   cell_wire::ListJobsResponse jobs;
@@ -140,6 +322,19 @@ absl::StatusOr<Measured> RunMesPolling(const Channels& channels, const Pace& pac
   if (watching.broken() > 0) {
     measured.errors["WATCH_BROKEN"] += watching.broken();
   }
+  return measured;
+}
+
+absl::StatusOr<Measured> RunPlanning(const Channels& channels, const Pace& pace) {
+  const auto planning = std::make_shared<Planning>(channels);
+  if (const absl::Status status = planning->Begin(); !status.ok()) {
+    return status;
+  }
+  Measured measured =
+      RunOpenLoop("CAM, programs admitted, planned, listed and sampled", pace,
+                  [planning](std::uint64_t n, Answered answered) { planning->Ask(n, std::move(answered)); });
+  measured.further["plans a second"] = planning->plans() / pace.duration_s;
+  measured.further["points a second"] = planning->points() / pace.duration_s;
   return measured;
 }
 

@@ -22,8 +22,8 @@ using google::protobuf::Message;
 using google::protobuf::MethodDescriptor;
 using google::protobuf::Reflection;
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInfinite = std::numeric_limits<double>::infinity();
+constexpr double kNotANumber = std::numeric_limits<double>::quiet_NaN();
+constexpr double kEndless = std::numeric_limits<double>::infinity();
 constexpr int kTooMany = 1001;
 constexpr auto kInvalid = absl::StatusCode::kInvalidArgument;
 constexpr const char* kEmptyDrawing = "0\nSECTION\n2\nENTITIES\n0\nENDSEC\n0\nEOF\n";
@@ -67,7 +67,7 @@ Row SetText(std::string name, std::string text, std::string reason, std::string 
 
 std::vector<Row> RowsOfDouble(const std::string& path) {
   std::vector<Row> rows;
-  for (const double bad : {kNan, kInfinite, -kInfinite, 1e300, -1e300}) {
+  for (const double bad : {kNotANumber, kEndless, -kEndless, 1e300, -1e300}) {
     rows.push_back(Set<double>(std::to_string(bad), &Reflection::SetDouble, bad,
                                std::isfinite(bad) ? "OUT_OF_RANGE" : "NOT_FINITE", path));
   }
