@@ -17,8 +17,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kPi = std::numbers::pi;
-constexpr double kDeg = kPi / 180.0;
+constexpr double kDeg = std::numbers::pi / 180.0;
 
 PilgerDie Die(IdleWish idle = IdleWish::kSmooth) {
   PilgerDie d;
@@ -119,7 +118,7 @@ TEST(PilgerProgram, EveryContactLiesOnTheGrooveAndNormalToIt) {
         {o.x_W_mm, o.y_W_mm, o.z_W_mm},
         {std::sin(o.b_rad), -std::sin(o.a_rad) * std::cos(o.b_rad), std::cos(o.a_rad) * std::cos(o.b_rad)}};
     // Newton on the distance, from near the intended contact.
-    double phi = program.points[i].c_rad - 2 * kPi * static_cast<double>(pass),
+    double phi = program.points[i].c_rad - 2 * std::numbers::pi * static_cast<double>(pass),
            alpha = program.passes[pass].alpha_rad;
     const auto distance = [&](double p, double a) {
       return RimDistance(place, d.wheel, Surface(d.groove, p, a));
@@ -143,7 +142,7 @@ TEST(PilgerProgram, EveryContactLiesOnTheGrooveAndNormalToIt) {
     EXPECT_NEAR(alpha, program.passes[pass].alpha_rad, 1e-6);
     // Normal: the contact's own tangents are square to the direction from the centre, which is square to the wheel's axis.
     const double wanted_phi =
-        PoseAtC(d.groove, d.wheel, program.points[i].c_rad - 2 * kPi * static_cast<double>(pass),
+        PoseAtC(d.groove, d.wheel, program.points[i].c_rad - 2 * std::numbers::pi * static_cast<double>(pass),
                 program.passes[pass].alpha_rad)
             .phi_rad;
     const Vector3d contact = Surface(d.groove, wanted_phi, program.passes[pass].alpha_rad);

@@ -13,7 +13,7 @@ namespace lambdajet::calibration {
 namespace {
 
 // With a settling time as machines have it.
-MachineDescription PaperSizedMachine() {
+MachineDescription SettlingMachine() {
   MachineDescription machine = support::PaperSizedMachine();
   machine.process.measuring_settle_time_s = 0.5;
   return machine;
@@ -21,7 +21,7 @@ MachineDescription PaperSizedMachine() {
 using testing::HasSubstr;
 
 TEST(MeasuringPlan, PutsEveryMarkInTheMiddleOfThePicture) {
-  const MachineDescription machine = PaperSizedMachine();
+  const MachineDescription machine = SettlingMachine();
   const auto plan = PlanMeasuringRun(machine);
   ASSERT_EQ(plan.reason, PlanReason::kPlanned) << plan.explanation;
   std::istringstream lines(plan.program);
@@ -56,7 +56,7 @@ TEST(MeasuringPlan, PutsEveryMarkInTheMiddleOfThePicture) {
 }
 
 TEST(MeasuringPlan, PiercesClearOfMarksAndInsideTheSheet) {
-  const MachineDescription machine = PaperSizedMachine();
+  const MachineDescription machine = SettlingMachine();
   const auto plan = PlanMeasuringRun(machine);
   for (const Eigen::Vector2d& p : plan.pierces_W_mm) {
     EXPECT_GT(p.x(), 0.0);
@@ -78,7 +78,7 @@ TEST(MeasuringPlan, FewerLooksWhenTheMachinesTimeIsShort) {
 }
 
 TEST(MeasuringPlan, IsRefusedWithoutMarksOrRoomToPierce) {
-  MachineDescription machine = PaperSizedMachine();
+  MachineDescription machine = SettlingMachine();
   MeasuringPlanOptions options;
   options.scrap_W_mm = Eigen::Vector2d(5000.0, 0.0);
   EXPECT_EQ(PlanMeasuringRun(machine, options).reason, PlanReason::kNoPlaceToPierce);
@@ -89,7 +89,7 @@ TEST(MeasuringPlan, IsRefusedWithoutMarksOrRoomToPierce) {
 }
 
 TEST(VerificationPlan, TakesMarksFarApart) {
-  const MachineDescription machine = PaperSizedMachine();
+  const MachineDescription machine = SettlingMachine();
   const auto plan = PlanVerification(machine, 2);
   ASSERT_EQ(plan.marks.size(), 2u);
   const auto a = *MarkPlace(machine, plan.marks[0]);

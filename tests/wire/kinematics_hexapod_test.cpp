@@ -17,7 +17,7 @@ namespace {
 
 using testing::HasSubstr;
 using worked::kDeg;
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+constexpr double kNoNumber = std::numeric_limits<double>::quiet_NaN();
 
 void Place(const Eigen::Vector3d& p, v1::SpatialVector& wire) {
   wire.set_x_mm(p.x());
@@ -162,8 +162,8 @@ TEST_F(HexapodWire, AMixedBatchAnswersEachPose) {
   v1::SolveInverseBatchRequest request;
   *request.mutable_mechanism() = selection_;
   request.set_stride(6);
-  for (const double number : {0., 0., 800., 0., 0., 0.,    kNan, 0., 800., 0.,  0., 0.,   0., 0., 1e300,
-                              0., 0., 0.,   0., 0., 1500., 0.,   0., 0.,   10., 0., 820., .1, .1, .1}) {
+  for (const double number : {0., 0., 800., 0., 0., 0.,    kNoNumber, 0., 800., 0.,  0., 0.,   0., 0., 1e300,
+                              0., 0., 0.,   0., 0., 1500., 0.,        0., 0.,   10., 0., 820., .1, .1, .1}) {
     request.add_pose(number);
   }
   v1::SolveInverseBatchResponse response;
@@ -214,7 +214,7 @@ TEST_F(HexapodWire, WorkspaceRequestsThatAreNoneAreRefused) {
   request.set_step_mm(0.01);
   EXPECT_EQ(reason(request), "TOO_FINE");
   request = WorkspaceRequest(selection_);
-  request.set_step_mm(kNan);
+  request.set_step_mm(kNoNumber);
   EXPECT_EQ(reason(request), "NOT_FINITE");
   request = WorkspaceRequest(selection_);
   request.mutable_box_to()->set_x_mm(-900);

@@ -20,7 +20,7 @@ namespace {
 
 constexpr double kSame = 1e-9;
 
-std::filesystem::path Folder() {
+std::filesystem::path RightPrograms() {
   return std::filesystem::path(std::getenv("LAMBDAJET_SOURCE_DIR")) / "tests/wire/right_programs";
 }
 
@@ -81,7 +81,7 @@ void ExpectSame(const std::vector<Operation>& got, const std::vector<Operation>&
 
 TEST(RightPrograms, MeanWhatTheirPlainTextSays) {
   int count = 0;
-  for (const auto& entry : std::filesystem::directory_iterator(Folder())) {
+  for (const auto& entry : std::filesystem::directory_iterator(RightPrograms())) {
     const std::string name = entry.path().filename().string();
     if (name.ends_with(".means.ngc") || !name.ends_with(".ngc")) {
       continue;

@@ -14,7 +14,7 @@
 namespace lambdajet::trajectory {
 namespace {
 
-std::string Folder() {
+std::string WrongPrograms() {
   return std::string(std::getenv("LAMBDAJET_SOURCE_DIR")) + "/tests/wire/wrong_programs/";
 }
 
@@ -35,7 +35,7 @@ struct Expectation {
 
 std::vector<Expectation> Expectations() {
   std::vector<Expectation> list;
-  std::istringstream table(Content(Folder() + "expected.csv"));
+  std::istringstream table(Content(WrongPrograms() + "expected.csv"));
   std::string row;
   std::getline(table, row);
   while (std::getline(table, row)) {
@@ -66,7 +66,7 @@ TEST(WrongPrograms, AreRefusedWithReasonLineAndColumn) {
   EXPECT_GE(expectations.size(), 300u);
   for (const Expectation& e : expectations) {
     SCOPED_TRACE(e.program);
-    const std::vector<ProgramFault> faults = FaultsOf(e, Content(Folder() + e.program + ".ngc"));
+    const std::vector<ProgramFault> faults = FaultsOf(e, Content(WrongPrograms() + e.program + ".ngc"));
     EXPECT_FALSE(faults.empty());
     if (faults.empty()) {
       continue;
