@@ -17,6 +17,8 @@ absl::Status NoMachine() {
 
 }  // namespace
 
+AccuracyRpc::~AccuracyRpc() = default;
+
 AccuracyRpc::AccuracyRpc(ActiveMachine active_machine)
     : active_machine_(std::move(active_machine)), pool_(kThreads, kMostWaiting) {}
 

@@ -19,6 +19,7 @@ using ActiveMachine = std::function<std::shared_ptr<const MachineDescription>()>
 class AccuracyRpc final : public v1::AccuracyService::CallbackService {
  public:
   explicit AccuracyRpc(ActiveMachine active_machine);
+  ~AccuracyRpc() override;  // out of line: whoever owns a service need not compile gRPC's classes below it
 
   grpc::ServerUnaryReactor* PredictContour(grpc::CallbackServerContext* context,
                                            const v1::PredictContourRequest* request,

@@ -8,6 +8,10 @@
 
 namespace lambdajet::calibration {
 
+CalibrationRpc::CalibrationRpc(CalibrationDesk& desk) : desk_(desk) {}
+
+CalibrationRpc::~CalibrationRpc() = default;
+
 grpc::ServerUnaryReactor* CalibrationRpc::PlanMeasuringRun(grpc::CallbackServerContext* context,
                                                            const v1::PlanMeasuringRunRequest* request,
                                                            v1::PlanMeasuringRunResponse* response) {

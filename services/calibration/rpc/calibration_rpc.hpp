@@ -11,7 +11,8 @@ namespace lambdajet::calibration {
 
 class CalibrationRpc final : public v1::CalibrationService::CallbackService {
  public:
-  explicit CalibrationRpc(CalibrationDesk& desk) : desk_(desk) {}
+  explicit CalibrationRpc(CalibrationDesk& desk);
+  ~CalibrationRpc() override;
 
   grpc::ServerUnaryReactor* PlanMeasuringRun(grpc::CallbackServerContext* context,
                                              const v1::PlanMeasuringRunRequest* request,

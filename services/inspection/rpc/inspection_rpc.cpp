@@ -99,6 +99,8 @@ std::vector<double> Flatten(const CutPath& path) {
 
 }  // namespace
 
+InspectionRpc::~InspectionRpc() = default;
+
 InspectionRpc::InspectionRpc(Recorder& recorder) : recorder_(recorder), pool_(kThreads, kMostWaiting) {}
 
 grpc::ServerUnaryReactor* InspectionRpc::BeginRecording(grpc::CallbackServerContext* context,

@@ -14,6 +14,7 @@ namespace lambdajet::inspection {
 class InspectionRpc final : public v1::InspectionService::CallbackService {
  public:
   explicit InspectionRpc(Recorder& recorder);  // outlives this
+  ~InspectionRpc() override;
 
   grpc::ServerUnaryReactor* BeginRecording(grpc::CallbackServerContext* context,
                                            const v1::BeginRecordingRequest* request,

@@ -9,6 +9,10 @@ namespace lambdajet::kinematics {
 
 using Rpc = KinematicsRpc;
 
+KinematicsRpc::KinematicsRpc(const MachineSlot& slot) : slot_(slot), answers_(slot) {}
+
+KinematicsRpc::~KinematicsRpc() = default;
+
 Rpc::Unary* Rpc::GetMachine(Context* context, const v1::GetMachineRequest* request,
                             v1::GetMachineResponse* response) {
   return Answer(context, [&] { return answers_.GetMachine(*request, *response); });

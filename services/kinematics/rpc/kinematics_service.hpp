@@ -13,7 +13,8 @@ namespace lambdajet::kinematics {
 
 class KinematicsRpc final : public v1::KinematicsService::CallbackService {
  public:
-  explicit KinematicsRpc(const MachineSlot& slot) : slot_(slot), answers_(slot) {}
+  explicit KinematicsRpc(const MachineSlot& slot);
+  ~KinematicsRpc() override;
 
   using Context = grpc::CallbackServerContext;
   using Unary = grpc::ServerUnaryReactor;
