@@ -71,7 +71,7 @@ TEST(MeasuringPlan, PiercesClearOfMarksAndInsideTheSheet) {
 TEST(MeasuringPlan, FewerLooksWhenTheMachinesTimeIsShort) {
   MeasuringPlanOptions options;
   options.longest_time_s = 34.0;
-  const auto plan = PlanMeasuringRun(PaperSizedMachine(), options);
+  const auto plan = PlanMeasuringRun(SettlingMachine(), options);
   EXPECT_EQ(plan.reason, PlanReason::kPlanned);
   EXPECT_LT(plan.marks.size(), 16u);
   EXPECT_LE(plan.machine_time_s, 34.0);
