@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "platform/rpc/argument_checks.hpp"
+#include "platform/rpc/roles.hpp"
 #include "platform/rpc/status_mapping.hpp"
 
 namespace lambdajet {
@@ -121,6 +122,43 @@ TEST(StatusMapping, GivesEveryFailureAReason) {
 TEST(StatusMapping, BearsDetailsThatAreRubbish) {
   const absl::Status read = FromWire(grpc::Status(grpc::StatusCode::INTERNAL, "x", "\xff\xff rubbish"));
   EXPECT_EQ(read.code(), absl::StatusCode::kInternal);
+}
+
+TEST(Roles, AreThoseOfTheCertificateAndNotOfTextThatLooksLikeThem) {
+  const auto name = CertificateName::FromSubject("CN=clerk\\,OU=operators,OU=office+OU=second floor,O=x");
+  EXPECT_EQ(name.common_name, "clerk,OU=operators");
+  EXPECT_THAT(name.organizational_units, testing::ElementsAre("office", "second floor"));
+  EXPECT_TRUE(CertificateName::FromSubject("").common_name.empty());
+}
+
+TEST(Roles, AllowWhatAnyRoleOfTheClientAllows) {
+  const auto table =
+      RoleTable::Parse({"viewer: CN=a OU=office -> CellService/Get* JobService/List*",
+                        "operator: CN=a OU=operators -> CellService/HoldJob", "admin: CN=root -> *"});
+  ASSERT_TRUE(table.ok()) << table.status();
+  const auto judge = [&](const char* subject, const char* method) {
+    return table->Judge(CertificateName::FromSubject(subject), std::string("/lambdajet.cell.v1.") + method);
+  };
+  EXPECT_TRUE(judge("CN=a", "CellService/GetJob").allowed);
+  EXPECT_TRUE(judge("CN=a", "CellService/HoldJob").allowed);
+  EXPECT_TRUE(judge("CN=b,OU=office", "JobService/ListJobs").allowed);
+  EXPECT_TRUE(judge("CN=root", "CellService/StopJob").allowed);
+  EXPECT_FALSE(judge("CN=b,OU=office", "CellService/HoldJob").allowed);
+  EXPECT_FALSE(judge("CN=a", "CellService/HoldJobs").allowed);
+  EXPECT_FALSE(judge("", "CellService/GetJob").allowed);
+  EXPECT_FALSE(judge("OU=a", "CellService/GetJob").allowed) << "a unit is no name";
+  EXPECT_TRUE(table->Judge({}, "/grpc.health.v1.Health/Check").allowed);
+  EXPECT_THAT(judge("CN=b,OU=office", "CellService/HoldJob").may_call,
+              testing::ElementsAre("operator", "admin"));
+}
+
+TEST(Roles, RefusesLinesThatNameNobodyOrNothing) {
+  for (const char* line :
+       {"", "operator", "operator: CN=a", ": CN=a -> */x", "operator: -> CellService/*",
+        "operator: a -> CellService/*", "operator: CN= -> CellService/*", "operator: CN=a ->",
+        "operator: CN=a -> HoldJob", "operator -> CN=a: CellService/*"}) {
+    EXPECT_EQ(TroubleReason(RoleTable::Parse({line}).status()), "BAD_ROLE") << line;
+  }
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 """Live houses over TLS with certificates made by openssl: who trusts the wrong authority, shows no certificate or a foreign one,
 or speaks plaintext is turned away; the cell asks trajectory over mutual TLS; plaintext beyond loopback is refused."""
 
+import json
 import pathlib
 import subprocess
 import sys
@@ -13,7 +14,7 @@ import cell_under_test as under_test
 from eventually import eventually
 
 BUILD = pathlib.Path(sys.argv.pop(1))
-UNREACHABLE, DONE = 3, 0
+UNREACHABLE, REFUSED, DONE = 3, 4, 0
 PATIENCE_S = 20
 
 
@@ -34,11 +35,11 @@ class Authority:
     def new_key(self, name):
         return ["-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes", "-keyout", self.folder / f"{name}.key"]
 
-    def issue(self, name):
-        """(certificate, key) of a host on this one."""
+    def issue(self, name, unit=None):
+        """(certificate, key) of a host on this one, in an organizational unit."""
         request, names, certificate = (self.folder / f"{name}.{end}" for end in ("csr", "cnf", "pem"))
         names.write_text("subjectAltName=IP:127.0.0.1,DNS:localhost\n")
-        self.openssl("req", *self.new_key(name), "-subj", f"/CN={name}", "-out", request)
+        self.openssl("req", *self.new_key(name), "-subj", f"/OU={unit}/CN={name}" if unit else f"/CN={name}", "-out", request)
         self.openssl("x509", "-req", "-days", "1", "-in", request, "-CA", self.ca, "-CAkey", self.folder / "ca.key", "-CAcreateserial",
                      "-extfile", names, "-out", certificate)
         return certificate, self.folder / f"{name}.key"
@@ -114,6 +115,48 @@ class Tls(unittest.TestCase):
         while "trajectory   SERVING" not in said:
             self.assertLess(time.monotonic(), deadline, said)
             _, said = self.ask("machine", "state", ca=self.authority.ca, own=self.client)
+
+    def test_a_client_may_call_what_its_role_allows(self):
+        roles = ("--rpc.roles=viewer: CN=client -> CalibrationService/Get* CalibrationService/List*,"
+                 "operator: OU=operators OU=fitters -> CalibrationService/*")
+        self.processes.flags.append(roles)
+        self.start("calibration", mutual=True)
+        operator, nobody = self.authority.issue("panel", "operators"), self.authority.issue("clerk", "an office\\,OU=operators")
+
+        def ask(own, *words):
+            return self.ask("calibration", *words, ca=self.authority.ca, own=own)
+
+        for own in (self.client, operator):
+            code, said = ask(own, "versions")
+            self.assertEqual((code, "machine file" in said), (DONE, True), said)
+        for own, words, role in ((self.client, ("activate", "0"), "viewer"), (nobody, ("versions",), "none"), (nobody, ("activate", "0"), "none")):
+            code, said = ask(own, *words)
+            self.assertEqual(code, REFUSED, said)
+            self.assertIn("ROLE_NOT_ALLOWED", said)
+            self.assertIn(f"role {role} (", said)
+            self.assertIn("operator is right", said)
+        code, said = ask(operator, "activate", "0")
+        self.assertEqual(code, DONE, said)
+        log = (self.processes.folder / "calibration.log").read_text().splitlines()
+        audit = [json.loads(line) for line in log if "rpc_role_refused" in line or "rpc_allowed" in line]
+        self.assertEqual([(line["event"], "panel" in line["client"], line["role"]) for line in audit],
+                         [("rpc_role_refused", False, "viewer")] + 2 * [("rpc_role_refused", False, "none")]
+                         + [("rpc_allowed", True, "operator")])
+
+    def test_roles_need_certificates_and_plaintext_on_loopback_knows_none(self):
+        roles = "--rpc.roles=viewer: CN=client -> CalibrationService/Get*"
+        own = [f"--rpc.certificate_file={self.server[0]}", f"--rpc.key_file={self.server[1]}"]
+        for further, words in ((own, "rpc.roles needs rpc.client_ca_file"),
+                               ([*own, f"--rpc.client_ca_file={self.authority.ca}", "--rpc.roles=viewer: everybody -> */*"], "names nobody")):
+            refused = subprocess.run([str(BUILD / "bin" / "calibration"), *self.processes.arguments("calibration"), roles, *further],
+                                     stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=30, check=False)
+            self.assertNotEqual(refused.returncode, 0)
+            self.assertIn(words, refused.stdout.decode())
+        self.processes.flags.append(roles)
+        self.processes.start_one("calibration")
+        eventually(lambda: self.processes.announced("calibration"), PATIENCE_S, lambda: self.processes.last_words("calibration"))
+        code, said = self.ask("calibration", "activate", "0")
+        self.assertEqual(code, DONE, said)
 
     def test_plaintext_beyond_loopback_is_refused_and_tls_is_served(self):
         refused = subprocess.run([str(BUILD / "bin" / "calibration"), *self.processes.arguments("calibration"), "--rpc.address=0.0.0.0:0"],

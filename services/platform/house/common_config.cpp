@@ -9,6 +9,9 @@ void DeclareRpc(ConfigSchema& schema, RpcOptions& rpc) {
   schema.AddPath("rpc.key_file", &rpc.key_file, "PEM private key of the certificate");
   schema.AddPath("rpc.client_ca_file", &rpc.client_ca_file,
                  "PEM certificates; if named, a client must show a certificate of one of them");
+  schema.Add("rpc.roles", &rpc.roles,
+             "who may call what, \"ROLE: CN=name OU=name -> Service/Method Service/*\" each; empty: "
+             "everybody everything");
   schema.Add("rpc.allow_plaintext", &rpc.allow_plaintext, "plaintext beyond loopback");
   schema.Add("rpc.reflection", &rpc.reflection, "let tools list the services");
   schema.Add("rpc.most_message_mib", &rpc.most_message_mib, {1, 1024}, "largest message");

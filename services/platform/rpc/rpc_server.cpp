@@ -13,6 +13,7 @@
 #include "foundation/contract/trouble.hpp"
 #include "platform/rpc/call_watch.hpp"
 #include "platform/rpc/certificates.hpp"
+#include "platform/rpc/roles.hpp"
 #include "platform/telemetry/log.hpp"
 #include "platform/telemetry/metrics.hpp"
 
@@ -29,7 +30,8 @@ bool IsLoopbackAddress(const std::string& address) {
          address.starts_with("unix:");
 }
 
-absl::StatusOr<std::shared_ptr<grpc::ServerCredentials>> MakeCredentials(const RpcOptions& options) {
+absl::StatusOr<std::shared_ptr<grpc::ServerCredentials>> MakeCredentials(const RpcOptions& options,
+                                                                         Log* log) {
   namespace tls = grpc::experimental;
   if (options.certificate_file.empty() && options.key_file.empty() && options.client_ca_file.empty()) {
     if (!IsLoopbackAddress(options.address) && !options.allow_plaintext) {
@@ -45,6 +47,14 @@ absl::StatusOr<std::shared_ptr<grpc::ServerCredentials>> MakeCredentials(const R
   if (absl::Status status = CheckKeyPair(options.certificate_file, options.key_file); !status.ok()) {
     return status;
   }
+  if (!options.roles.empty() && options.client_ca_file.empty()) {
+    return Trouble(absl::StatusCode::kInvalidArgument, "BAD_ROLE",
+                   "rpc.roles needs rpc.client_ca_file: a client without a certificate has no role");
+  }
+  const auto roles = RoleTable::Parse(options.roles);
+  if (!roles.ok()) {
+    return roles.status();
+  }
   if (options.client_ca_file.empty()) {
     tls::TlsServerCredentialsOptions credentials(std::make_shared<tls::FileWatcherCertificateProvider>(
         options.key_file, options.certificate_file, kCertificateCheckS));
@@ -59,7 +69,11 @@ absl::StatusOr<std::shared_ptr<grpc::ServerCredentials>> MakeCredentials(const R
   credentials.watch_identity_key_cert_pairs();
   credentials.watch_root_certs();
   credentials.set_cert_request_type(GRPC_SSL_REQUEST_AND_REQUIRE_CLIENT_CERTIFICATE_AND_VERIFY);
-  return tls::TlsServerCredentials(credentials);
+  auto server_credentials = tls::TlsServerCredentials(credentials);
+  if (!options.roles.empty()) {
+    server_credentials->SetAuthMetadataProcessor(MakeRoleGuard(*roles, log));
+  }
+  return server_credentials;
 }
 
 void SetLimits(grpc::ServerBuilder& builder, const RpcOptions& options) {
@@ -94,7 +108,7 @@ void RpcServer::Add(grpc::Service& service, const std::string& full_name) {
 }
 
 absl::Status RpcServer::Start() {
-  const auto credentials = MakeCredentials(options_);
+  const auto credentials = MakeCredentials(options_, log_);
   if (!credentials.ok()) {
     return credentials.status();
   }

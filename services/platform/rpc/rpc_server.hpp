@@ -1,11 +1,11 @@
 // Serves a house's gRPC services, with TLS, limits, health, metrics and an orderly end.
 //
 // Model: a thin value over grpc::Server with the callback API (handlers.hpp). Plaintext only on loopback unless
-// allow_plaintext says so; with client_ca_file a client must show a certificate of that CA (mTLS). Certificate files are
+// allow_plaintext says so; with client_ca_file a client must show a certificate of that CA (mTLS), and with roles it may call what its role allows (roles.hpp; plaintext knows no roles). Certificate files are
 // watched, so a rotated certificate is used without a restart. Health is NOT_SERVING, for each service and for "", until
 // SetServing(true). Every RPC is counted and timed by an interceptor; failures are logged with their reason.
 // Threads: Start() and Shutdown() from main; SetServing() from any.
-// Errors: FAILED_PRECONDITION PLAINTEXT_REFUSED, INVALID_ARGUMENT BAD_CERTIFICATE or BAD_ADDRESS, UNAVAILABLE
+// Errors: FAILED_PRECONDITION PLAINTEXT_REFUSED, INVALID_ARGUMENT BAD_CERTIFICATE, BAD_ROLE or BAD_ADDRESS, UNAVAILABLE
 // ADDRESS_IN_USE.
 #pragma once
 
@@ -29,6 +29,7 @@ struct RpcOptions {
   std::string certificate_file;         // PEM chain; empty: plaintext
   std::string key_file;                 // PEM
   std::string client_ca_file;           // PEM; empty: clients need no certificate
+  std::vector<std::string> roles;       // as roles.hpp reads them; empty: every client may call everything
   bool allow_plaintext = false;         // beyond loopback
   bool reflection = false;
   int most_message_mib = 128;  // so that a program too large for its house is refused by it, with its reason

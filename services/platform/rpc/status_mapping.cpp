@@ -78,6 +78,13 @@ absl::Status FromWire(const grpc::Status& status) {
       }
     }
   }
+  // A call refused before its handler has no room for details: the reason stands before the words.
+  const std::string& message = status.error_message();
+  constexpr std::string_view kRefusedByRole = "ROLE_NOT_ALLOWED: ";
+  if (info.reason().empty() && code == absl::StatusCode::kPermissionDenied &&
+      message.starts_with(kRefusedByRole)) {
+    return Trouble(code, "ROLE_NOT_ALLOWED", message.substr(kRefusedByRole.size()));
+  }
   const TroubleDetails metadata(info.metadata().begin(), info.metadata().end());
   const std::string reason = info.reason().empty() ? absl::StatusCodeToString(code) : info.reason();
   absl::Status trouble = Trouble(code, reason, status.error_message(), metadata);
