@@ -6,6 +6,18 @@
 
 namespace lambdajet::cli {
 
+namespace {
+
+// What binds; where nothing does, what the plan comes nearest to.
+std::string Because(const trajectory::SlowStretch& s) {
+  const std::string limit(FeedLimitName(s.limit));
+  return s.limit == trajectory::FeedLimit::kSmoothing ? limit + ", at " + Fixed(100.0 * s.reached_share, 0) +
+                                                            " % of " + std::string(FeedLimitName(s.nearest))
+                                                      : limit;
+}
+
+}  // namespace
+
 void TellFeed(const std::vector<trajectory::BindingLength>& binding,
               const std::vector<trajectory::SlowStretch>& slow, Output& output) {
   constexpr std::size_t kMostTold = 20;
@@ -21,8 +33,7 @@ void TellFeed(const std::vector<trajectory::BindingLength>& binding,
   for (std::size_t i = 0; i < std::min(slow.size(), kMostTold); ++i) {
     const auto& s = slow[i];
     stretches.rows.push_back({std::to_string(s.line), Fixed(s.from_s_mm, 1), Fixed(s.to_s_mm, 1),
-                              Fixed(s.programmed_mm_per_s, 1), Fixed(s.lowest_mm_per_s, 1),
-                              std::string(FeedLimitName(s.limit))});
+                              Fixed(s.programmed_mm_per_s, 1), Fixed(s.lowest_mm_per_s, 1), Because(s)});
   }
   output.Text("where the programmed feed is not held (first " + std::to_string(stretches.rows.size()) +
               " of " + std::to_string(slow.size()) + "):");
@@ -45,7 +56,11 @@ nlohmann::json SlowJson(const std::vector<trajectory::SlowStretch>& slow) {
                    {"from_s_mm", s.from_s_mm},
                    {"to_s_mm", s.to_s_mm},
                    {"programmed_mm_per_s", s.programmed_mm_per_s},
-                   {"lowest_mm_per_s", s.lowest_mm_per_s}});
+                   {"lowest_mm_per_s", s.lowest_mm_per_s},
+                   {"nearest", std::string(FeedLimitName(s.nearest))},
+                   {"reached_share", s.reached_share},
+                   {"at_s_mm", s.at_s_mm},
+                   {"share", s.share}});
   }
   return all;
 }

@@ -19,8 +19,6 @@ namespace lambdajet::trajectory {
 namespace {
 
 constexpr double kRelative = 1e-6;
-constexpr double kNamedLimitReached = 0.5;  // by each; by eight of ten: 0.9
-constexpr double kSmoothing_s = 0.08;
 
 int ProgramCount() {
   const char* wanted = std::getenv("LAMBDAJET_RANDOM_PROGRAMS");
@@ -73,20 +71,24 @@ struct LimitShares {
 
   void Take(const MachineDescription& m, const Jet& jet, const Segment& s) {
     for (double t = 0.0; t < s.duration_s; t += 1e-4) {
-      for (std::size_t a = 0; a < 2; ++a) {
-        const Polynomial q = Sum(s.q_mm[a], s.lead_mm[a]);
-        const ActuatorLimits& limit = m.actuators[a];
-        velocity[a] = std::max(velocity[a], std::abs(q.first(t)) / limit.velocity_mm_per_s);
-        acceleration[a] = std::max(acceleration[a], std::abs(q.second(t)) / limit.acceleration_mm_per_s2);
-        jerk[a] = std::max(jerk[a], std::abs(q.third(t)) / limit.jerk_mm_per_s3);
-      }
-      const kinematics::Motion motion = jet.At(s, t);
-      path_velocity = std::max(path_velocity, motion.velocity_mm_per_s.norm() /
-                                                  std::max(m.path.rapid_mm_per_s, m.path.feed_mm_per_s));
-      path_acceleration =
-          std::max(path_acceleration, motion.acceleration_mm_per_s2.norm() / m.path.acceleration_mm_per_s2);
-      path_jerk = std::max(path_jerk, jet.Jerk(s, t).norm() / m.path.jerk_mm_per_s3);
+      TakeAt(m, jet, s, t);
     }
+  }
+
+  void TakeAt(const MachineDescription& m, const Jet& jet, const Segment& s, double t) {
+    for (std::size_t a = 0; a < 2; ++a) {
+      const Polynomial q = Sum(s.q_mm[a], s.lead_mm[a]);
+      const ActuatorLimits& limit = m.actuators[a];
+      velocity[a] = std::max(velocity[a], std::abs(q.first(t)) / limit.velocity_mm_per_s);
+      acceleration[a] = std::max(acceleration[a], std::abs(q.second(t)) / limit.acceleration_mm_per_s2);
+      jerk[a] = std::max(jerk[a], std::abs(q.third(t)) / limit.jerk_mm_per_s3);
+    }
+    const kinematics::Motion motion = jet.At(s, t);
+    path_velocity = std::max(path_velocity, motion.velocity_mm_per_s.norm() /
+                                                std::max(m.path.rapid_mm_per_s, m.path.feed_mm_per_s));
+    path_acceleration =
+        std::max(path_acceleration, motion.acceleration_mm_per_s2.norm() / m.path.acceleration_mm_per_s2);
+    path_jerk = std::max(path_jerk, jet.Jerk(s, t).norm() / m.path.jerk_mm_per_s3);
   }
 
   double Worst() const {
@@ -448,53 +450,92 @@ double ShareOf(FeedLimit limit, const LimitShares& shares) {
   }
 }
 
-// Where a plan says that a limit of motion slows it, what is played comes near to that limit, there or where the smoothing
-// reaches from there.
-TEST(BindingLaw, ALimitThatIsNamedIsReached) {
-  const MachineDescription m = DemoLikeMachine();
-  const Jet jet(m);
-  constexpr double kReach_mm = 6.0;
+// What is played within a millisecond of a path length, sampled at 10 kHz.
+class Played {
+ public:
+  Played(const MachineDescription& m, const Plan& plan) : m_(m), jet_(m), plan_(plan) {}
+
+  LimitShares About(double s_mm) {
+    LimitShares shares;
+    while (segment_ > 0 && plan_.segments[segment_].s_mm.value(0.0) > s_mm) {
+      --segment_;
+    }
+    while (segment_ + 1 < plan_.segments.size() && plan_.segments[segment_ + 1].s_mm.value(0.0) <= s_mm) {
+      ++segment_;
+    }
+    const Segment& s = plan_.segments[segment_];
+    double t = 0.0;
+    while (t < s.duration_s && s.s_mm.value(t) < s_mm) {
+      t += 1e-4;
+    }
+    for (double at = std::max(0.0, t - 1e-3); at < std::min(s.duration_s, t + 1e-3); at += 1e-4) {
+      shares.TakeAt(m_, jet_, s, at);
+    }
+    return shares;
+  }
+
+ private:
+  const MachineDescription& m_;
+  Jet jet_;
+  const Plan& plan_;
+  std::size_t segment_ = 0;
+};
+
+// Where a plan says that a limit of motion slows it, what is played reaches that limit within 1 % at the place it names, and
+// where it says that the smoothing keeps it below, below by as much as it says.
+TEST(BindingLaw, WhatIsNamedIsReachedWhereItIsNamed) {
+  MachineDescription tight = DemoLikeMachine();
+  tight.machine_id = "tight";
+  tight.actuators[0].velocity_mm_per_s = tight.actuators[1].velocity_mm_per_s = 70.0;
+  tight.actuators[0].acceleration_mm_per_s2 = tight.actuators[1].acceleration_mm_per_s2 = 700.0;
+  tight.actuators[1].jerk_mm_per_s3 = 12000.0;
   std::array<std::size_t, kFeedLimitCount> named{};
-  std::array<double, kFeedLimitCount> least{};
-  least.fill(1.0);
-  std::size_t stretches = 0, within_1 = 0, within_10 = 0;
-  for (unsigned seed = 1; seed <= 60; ++seed) {
-    SCOPED_TRACE(seed);
-    const PlannedProgram planned = PlanPartProgram(RandomProgram(seed).Make(), m, {});
-    ASSERT_TRUE(planned.faults.empty());
-    for (const SlowStretch& slow : planned.slow) {
-      // What lasts shorter than the smoothing never comes to its full height.
-      const double lasts_s = (slow.to_s_mm - slow.from_s_mm) / std::max(1e-3, slow.programmed_mm_per_s);
-      if (ShareOf(slow.limit, {}) < 0.0 || lasts_s < kSmoothing_s) {
-        continue;
-      }
-      LimitShares shares;
-      for (const Segment& s : planned.plan.segments) {
-        if (s.s_mm.value(s.duration_s) >= slow.from_s_mm - kReach_mm &&
-            s.s_mm.value(0.0) <= slow.to_s_mm + kReach_mm) {
-          shares.Take(m, jet, s);
+  std::array<double, kFeedLimitCount> length_mm{};
+  double worst_off = 0.0;
+  std::size_t checked = 0;
+  for (const MachineDescription& m : {DemoLikeMachine(), tight}) {
+    for (unsigned seed = 1; seed <= 40; ++seed) {
+      SCOPED_TRACE(m.machine_id + " " + std::to_string(seed));
+      const PlannedProgram planned = PlanPartProgram(RandomProgram(seed).Make(), m, {});
+      ASSERT_TRUE(planned.faults.empty());
+      Played played(m, planned.plan);
+      double told_mm = 0.0, cut_mm = 0.0, last_mm = 0.0;
+      for (const SlowStretch& slow : planned.slow) {
+        ASSERT_GE(slow.from_s_mm, last_mm - 1e-9);
+        ASSERT_GE(slow.at_s_mm, slow.from_s_mm);
+        ASSERT_LE(slow.at_s_mm, slow.to_s_mm);
+        last_mm = slow.to_s_mm;
+        ++named[static_cast<std::size_t>(slow.limit)];
+        length_mm[static_cast<std::size_t>(slow.limit)] += slow.to_s_mm - slow.from_s_mm;
+        const double share = ShareOf(slow.nearest, played.About(slow.at_s_mm));
+        if (share < 0.0) {
+          continue;  // tolerances: held by the laws of the contour
         }
+        ++checked;
+        const bool reached = slow.limit != FeedLimit::kSmoothing;
+        EXPECT_GE(share, slow.reached_share - 0.01) << FeedLimitName(slow.nearest) << " at " << slow.at_s_mm;
+        worst_off = std::max(worst_off, slow.reached_share - share);
+        EXPECT_TRUE(!reached || share >= 0.99) << share << " of " << FeedLimitName(slow.limit) << " at "
+                                               << slow.at_s_mm << " line " << slow.line;
+        EXPECT_TRUE(reached || slow.reached_share < 0.992);
       }
-      const double share = ShareOf(slow.limit, shares);
-      const auto i = static_cast<std::size_t>(slow.limit);
-      ++named[i];
-      least[i] = std::min(least[i], share);
-      ++stretches;
-      within_1 += share >= 0.99 ? 1 : 0;
-      within_10 += share >= 0.9 ? 1 : 0;
-      EXPECT_GE(share, kNamedLimitReached) << FeedLimitName(slow.limit) << " s " << slow.from_s_mm << " to "
-                                           << slow.to_s_mm << " line " << slow.line;
+      for (const BindingLength& b : planned.binding) {
+        cut_mm += b.length_mm;
+        told_mm += b.limit == FeedLimit::kFeed ? 0.0 : b.length_mm;
+      }
+      EXPECT_NEAR(cut_mm, planned.cutting_length_mm, 0.5);  // that one is counted in samples
+      EXPECT_LE(told_mm, cut_mm + 1e-9);
     }
   }
   for (std::size_t i = 0; i < kFeedLimitCount; ++i) {
     if (named[i] > 0) {
-      std::printf("%s named for %zu slow stretches, reached to at least %.4f of it\n",
-                  std::string(FeedLimitName(static_cast<FeedLimit>(i))).c_str(), named[i], least[i]);
+      std::printf("%s binds in %zu slow stretches, %.0f mm\n",
+                  std::string(FeedLimitName(static_cast<FeedLimit>(i))).c_str(), named[i], length_mm[i]);
     }
   }
-  std::printf("of %zu slow stretches the named limit is reached within 1 %% in %zu, within 10 %% in %zu\n",
-              stretches, within_1, within_10);
-  EXPECT_GE(within_10, stretches * 8 / 10);
+  std::printf("of %zu stretches each reaches what it says, at worst %.4f of the limit less\n", checked,
+              worst_off);
+  EXPECT_GE(named[static_cast<std::size_t>(FeedLimit::kPathJerk)], 50u);
 }
 
 bool Same(const Segment& a, const Segment& b) {

@@ -195,7 +195,8 @@ std::string_view FeedLimitName(FeedLimit limit) {
                                                                            "ACTUATOR_3_ACCELERATION",
                                                                            "ACTUATOR_4_ACCELERATION",
                                                                            "ACTUATOR_5_ACCELERATION",
-                                                                           "ACTUATOR_6_ACCELERATION"};
+                                                                           "ACTUATOR_6_ACCELERATION",
+                                                                           "SMOOTHING"};
   return kNames[static_cast<std::size_t>(limit)];
 }
 

@@ -37,8 +37,9 @@ enum class FeedLimit : std::uint8_t {
   kActuator4Acceleration,
   kActuator5Acceleration,
   kActuator6Acceleration,
+  kSmoothing,  // none is reached: the smoothing in time keeps the plan below them
 };
-inline constexpr std::size_t kFeedLimitCount = 20;
+inline constexpr std::size_t kFeedLimitCount = 21;
 
 // UPPER_SNAKE.
 std::string_view FeedLimitName(FeedLimit limit);
@@ -53,7 +54,8 @@ struct BindingLength {
 };
 
 // A stretch of cutting path where the programmed feed is not held, for one reason; where another limit takes over, another
-// stretch begins.
+// stretch begins. What is said of the limit is measured on the plan that is given away, by sliders' plans (feed/binding);
+// hexapods' plans name what the speed profile found and leave the rest at 0.
 struct SlowStretch {
   double from_s_mm = 0.0;
   double to_s_mm = 0.0;
@@ -61,6 +63,10 @@ struct SlowStretch {
   FeedLimit limit = FeedLimit::kFeed;
   double programmed_mm_per_s = 0.0;
   double lowest_mm_per_s = 0.0;
+  double reached_share = 0.0;            // of the nearest limit, at most
+  double at_s_mm = 0.0;                  // there
+  double share = 0.0;                    // of the stretch's length where the limit is reached
+  FeedLimit nearest = FeedLimit::kFeed;  // the same limit; SMOOTHING: the one that it stays below
 };
 
 template <std::size_t N>

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "trajectory/core/feed/binding.hpp"
 #include "trajectory/core/feed/idle_planner.hpp"
 #include "trajectory/core/feed/level_tops.hpp"
 #include "trajectory/core/feed/reach.hpp"
@@ -22,7 +23,8 @@ constexpr double kAllowed = 1.0 + 5e-7;       // of a limit, on the final polyno
 constexpr double kStrongestSlowDown = 0.6;    // in one pass
 constexpr double kCure = 0.997;               // slower than would just do, so that few passes are needed
 constexpr int kContourChecks = 8;             // a segment
-constexpr double kToleranceShare = 0.98;      // measured at these, held between them
+constexpr double kToleranceShare = 0.97;      // measured at these, held between them
+constexpr double kLeastTold = 0.5;            // of the tolerance, measured exactly from there on
 constexpr double kPlayedMargin = 1.0 + 1e-5;  // the actuators' quintics make the jet's, nearly
 constexpr double kCornerCosine = 0.995;       // kinks above 0.1 rad are corners
 constexpr double kCornerLook_mm = 2.0;
@@ -671,33 +673,43 @@ class StretchPlanner {
 
   void ContourExcess(const Vector2d& p, double s, Excess& excess) {
     double tolerance;
-    const double deviation = Deviation(p, s, tolerance);
+    const double deviation = Deviation(p, s, kToleranceShare, tolerance);
     if (deviation >= 0.0) {
       plan_.contour_deviation_mm = std::max(plan_.contour_deviation_mm, deviation);
       Judge(deviation / (kToleranceShare * tolerance), 0.6, FeedLimit::kContourTolerance, excess);
     }
   }
 
-  // Distance of the planned point from the programmed contour; negative outside of runs.
-  double Deviation(const Vector2d& p, double s, double& tolerance) {
+  // Moves on to the run and piece at s; false outside of runs.
+  bool MoveTo(double s) {
     while (run_at_ < elements_.size() && (elements_[run_at_].kind != ElementKind::kRun ||
                                           planned_[run_at_].begin_s_mm + planned_[run_at_].length_mm < s)) {
       ++run_at_;
       piece_at_ = 0;
     }
     if (run_at_ == elements_.size() || planned_[run_at_].begin_s_mm > s) {
+      return false;
+    }
+    const std::vector<PathPiece>& pieces = elements_[run_at_].pieces;
+    while (piece_at_ + 1 < pieces.size() &&
+           pieces[piece_at_ + 1].begin_mm <= s - planned_[run_at_].begin_s_mm) {
+      ++piece_at_;
+    }
+    return true;
+  }
+
+  // Distance of the planned point from the programmed contour; negative outside of runs. It may be taken too large where it
+  // is below `exact_from` of the tolerance and of the largest so far.
+  double Deviation(const Vector2d& p, double s, double exact_from, double& tolerance) {
+    if (!MoveTo(s)) {
       return -1.0;
     }
     const std::vector<PathPiece>& pieces = elements_[run_at_].pieces;
     const double offset = s - planned_[run_at_].begin_s_mm;
-    while (piece_at_ + 1 < pieces.size() && pieces[piece_at_ + 1].begin_mm <= offset) {
-      ++piece_at_;
-    }
     tolerance = pieces[piece_at_].tolerance_mm;
     double distance = DistanceTo(pieces[piece_at_], p);
-    // Neighbours only where the answer could matter: at a new largest deviation, or one that may be too large.
-    if (distance >
-        std::min(std::max(plan_.contour_deviation_mm, 0.02 * tolerance), kToleranceShare * tolerance)) {
+    // Neighbours only where the answer could matter.
+    if (distance > std::min(std::max(plan_.contour_deviation_mm, 0.02 * tolerance), exact_from * tolerance)) {
       constexpr double kLook_mm = 1.0;
       for (std::size_t i = piece_at_;
            i-- > 0 && offset - (pieces[i].begin_mm + pieces[i].length_mm) < kLook_mm;) {
@@ -811,44 +823,107 @@ class StretchPlanner {
         const IdleMove& m = planned_[i].idle;
         plan_.idle.push_back({elements_[i].line, m.name, m.reason, m.duration_s, m.start_speed_mm_per_s,
                               m.peak_acceleration_mm_per_s2});
-      } else {
-        ReportRun(i);
       }
     }
+    ReportBinding();
     ReportSamples();
   }
 
-  void ReportRun(std::size_t i) {
-    const PlannedRun& run = planned_[i].run;
-    std::array<double, kFeedLimitCount> length{};
-    std::size_t piece = 0;
-    const std::vector<PathPiece>& pieces = elements_[i].pieces;
-    SlowStretch* open = nullptr;
-    for (std::size_t k = 0; k + 1 < run.solved.size(); ++k) {
-      const ProfileNode& node = run.solved[k];
-      const double cell = run.solved[k + 1].offset_mm - node.offset_mm;
-      length[static_cast<std::size_t>(node.binding)] += cell;
-      while (piece + 1 < pieces.size() && pieces[piece + 1].begin_mm <= node.offset_mm) {
-        ++piece;
-      }
-      const double speed = std::sqrt(node.x);
-      if (speed >= 0.999 * pieces[piece].feed_mm_per_s) {
-        open = nullptr;
-        continue;
-      }
-      const double s = planned_[i].begin_s_mm + node.offset_mm;
-      if (open == nullptr || open->limit != node.binding) {
-        plan_.slow.push_back({s, s, pieces[piece].line, node.binding, pieces[piece].feed_mm_per_s, speed});
-        open = &plan_.slow.back();
-      }
-      open->to_s_mm = s + cell;
-      if (speed < open->lowest_mm_per_s) {
-        open->lowest_mm_per_s = speed;
-        open->line = pieces[piece].line;
+  // Moments a check apart: what slows the cut where it is slow, on the final polynomials.
+  void ReportBinding() {
+    const double change_s = model_.filter.second_s + model_.filter.third_s + 6 * knot_;
+    const double apart_s = knot_ * model_.options.knots_per_segment / kContourChecks;
+    BindingReport report(static_cast<std::size_t>(change_s / apart_s), plan_.slow);
+    run_at_ = piece_at_ = node_at_ = corner_at_ = 0;
+    bool open = false;
+    for (std::size_t n = 0; n < segment_count_; ++n) {
+      for (int k = 0; k < kContourChecks; ++k) {
+        const double t = apart_s * k;
+        const Polynomial& s_mm = plan_.segments[n].s_mm;
+        const double s = s_mm.value(t), speed = std::max(0.0, s_mm.first(t));
+        const std::size_t run = run_at_;
+        const bool in_run = MoveTo(s);
+        if (open && (!in_run || run != run_at_ || speed >= kFeedHeld * Piece().feed_mm_per_s)) {
+          report.Close(in_run && run == run_at_ ? s : planned_[run].begin_s_mm + planned_[run].length_mm);
+          open = false;
+        }
+        if (in_run && speed < kFeedHeld * Piece().feed_mm_per_s) {
+          report.Take(MomentAt(n, t, s, speed));
+          open = true;
+        }
       }
     }
+    if (open) {
+      report.Close(planned_[run_at_].begin_s_mm + planned_[run_at_].length_mm);
+    }
+    SumBinding();
+  }
+
+  const PathPiece& Piece() const { return elements_[run_at_].pieces[piece_at_]; }
+
+  FeedMoment MomentAt(std::size_t n, double t, double s, double speed) {
+    const Segment& segment = plan_.segments[n];
+    FeedMoment m{s, speed, Piece().feed_mm_per_s, Piece().line, FeedLimit::kFeed, 0.0};
+    for (std::size_t a = 0; a < 2; ++a) {
+      const ActuatorLimits& limit = model_.machine.actuators[a];
+      const Polynomial &q = segment.q_mm[a], &lead = segment.lead_mm[a];
+      m.Offer(ActuatorVelocityLimit(a), std::abs(q.first(t) + lead.first(t)) / limit.velocity_mm_per_s);
+      m.Offer(ActuatorAccelerationLimit(a),
+              std::abs(q.second(t) + lead.second(t)) / limit.acceleration_mm_per_s2);
+      m.Offer(FeedLimit::kActuatorJerk, std::abs(q.third(t) + lead.third(t)) / limit.jerk_mm_per_s3);
+    }
+    const PathLimits& path = model_.machine.path;
+    const Vector2d a = played_[n].second(t), v = played_[n].first(t);
+    const double along = v.norm() > 0.0 ? a.dot(v) / v.norm() : a.norm();
+    m.Offer(2.0 * along * along < a.squaredNorm() ? FeedLimit::kCurvature : FeedLimit::kPathAcceleration,
+            a.norm() / path.acceleration_mm_per_s2);
+    m.Offer(FeedLimit::kPathJerk, played_[n].third(t).norm() / path.jerk_mm_per_s3);
+    double tolerance_mm = 1.0;
+    const double deviation_mm = Deviation(played_[n].value(t), s, kLeastTold, tolerance_mm);
+    m.Offer(FeedLimit::kContourTolerance, deviation_mm / tolerance_mm);
+    OfferPlaces(n, t, s, m);
+    return m;
+  }
+
+  // A corner is passed at the moment that is nearest to it; a predicted error binds where its speed is run.
+  void OfferPlaces(std::size_t n, double t, double s, FeedMoment& m) {
+    const double time_s =
+        knot_ *
+            (static_cast<double>(n * static_cast<std::size_t>(model_.options.knots_per_segment) + first_) -
+             static_cast<double>(pad_)) +
+        t;
+    for (; corner_at_ < corners_.size() && corners_[corner_at_].time_s <= time_s + 1e-9; ++corner_at_) {
+      const Corner& corner = corners_[corner_at_];
+      m.Offer(FeedLimit::kCorner, corner.nearest_mm / corner.tolerance_mm);
+    }
+    if (!model_.options.compensate && !model_.options.pace) {
+      return;
+    }
+    if (node_run_ != run_at_) {
+      node_run_ = run_at_;
+      node_at_ = 0;
+    }
+    const std::vector<ProfileNode>& nodes = planned_[run_at_].run.solved;
+    const double offset = s - planned_[run_at_].begin_s_mm;
+    while (node_at_ + 1 < nodes.size() && nodes[node_at_ + 1].offset_mm <= offset) {
+      ++node_at_;
+    }
+    if (nodes[node_at_].binding == FeedLimit::kPredictedError && nodes[node_at_].x > 0.0) {
+      m.Offer(FeedLimit::kPredictedError, std::min(1.0, m.speed_mm_per_s / std::sqrt(nodes[node_at_].x)));
+    }
+  }
+
+  void SumBinding() {
+    std::array<double, kFeedLimitCount> length{};
+    for (std::size_t i = 0; i < elements_.size(); ++i) {
+      length[0] += elements_[i].kind == ElementKind::kRun ? planned_[i].length_mm : 0.0;
+    }
+    for (const SlowStretch& slow : plan_.slow) {
+      length[static_cast<std::size_t>(slow.limit)] += slow.to_s_mm - slow.from_s_mm;
+      length[0] -= slow.to_s_mm - slow.from_s_mm;
+    }
     for (std::size_t j = 0; j < kFeedLimitCount; ++j) {
-      if (length[j] > 0.0) {
+      if (length[j] > 1e-9) {
         plan_.binding.push_back({static_cast<FeedLimit>(j), length[j]});
       }
     }
@@ -907,6 +982,8 @@ class StretchPlanner {
   std::size_t corner_at_ = 0;
   std::size_t run_at_ = 0;
   std::size_t piece_at_ = 0;
+  std::size_t node_run_ = 0;
+  std::size_t node_at_ = 0;
   std::uint32_t exceeded_line_ = 0;
   double widening_ = 1.0;
 };
