@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
+#include <random>
 #include <sstream>
 
 #include "foundation/contract/trouble.hpp"
@@ -136,16 +137,17 @@ class PlayedModules {
     const std::lock_guard lock(mutex_);
     return batches_;
   }
-  void DropEvery(int n) {
+  // One batch in n, by chance: lost by count, a round of n batches that is sent again would lose its first one for ever.
+  void LoseOneIn(int n) {
     const std::lock_guard lock(mutex_);
-    drop_every_ = n;
+    lost_share_ = 1.0 / n;
   }
 
  private:
   void Take(const SegmentBatch& batch) {
     const std::lock_guard lock(mutex_);
     ++batches_;
-    if (batch.plan() != plan_ || (drop_every_ > 0 && batches_ % drop_every_ == 0)) {
+    if (batch.plan() != plan_ || std::bernoulli_distribution(lost_share_)(chance_)) {
       return;
     }
     for (std::uint32_t i = 0; i < batch.count(); ++i) {
@@ -185,7 +187,9 @@ class PlayedModules {
   std::uint64_t number_ = 0;
   std::uint32_t next_segment_ = 0, next_event_ = 0, next_gate_ = 1;
   double buffered_end_s_ = 0.0, tau_s_ = 0.0, end_q_ = 0.0, furthest_ahead_s_ = 0.0;
-  int joints_broken_ = 0, batches_ = 0, drop_every_ = 0;
+  int joints_broken_ = 0, batches_ = 0;
+  double lost_share_ = 0.0;
+  std::mt19937 chance_{7};
   Writer<idl::drive::v1::StatePubSubType> drive_;
   Writer<idl::main_motion::v1::StatePubSubType> motion_;
   Reader<SegmentBatchPubSubType> segments_;
@@ -290,7 +294,7 @@ TEST_F(TrajectoryProgram, StreamsWhatModulesLackAndNoMoreThanTheyNeed) {
                                [&] { return modules.Say(), modules.buffered_end_s() < 2.2; }));
 
   // Half way with losses; then the program is killed, started again, asked again, and the plan is the same.
-  modules.DropEvery(5);
+  modules.LoseOneIn(5);
   ASSERT_TRUE(Eventually([&] {
     modules.PlayTo(modules.tau_s() + 0.05);
     return modules.Say(), modules.next_segment() > summary.segment_count() / 2;
