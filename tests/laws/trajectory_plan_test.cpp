@@ -20,9 +20,20 @@ namespace {
 
 constexpr double kRelative = 1e-6;
 
-int ProgramCount() {
-  const char* wanted = std::getenv("LAMBDAJET_RANDOM_PROGRAMS");
-  return wanted == nullptr ? 60 : std::atoi(wanted);
+// LAMBDAJET_RANDOM_PROGRAMS: how many, or FIRST-LAST.
+struct Seeds {
+  int first = 1;
+  int last = 60;
+};
+
+Seeds WantedSeeds() {
+  Seeds seeds;
+  if (const char* wanted = std::getenv("LAMBDAJET_RANDOM_PROGRAMS"); wanted != nullptr) {
+    int first = 0, last = 0;
+    const int numbers = std::sscanf(wanted, "%d-%d", &first, &last);
+    seeds = numbers == 2 ? Seeds{first, last} : Seeds{1, first};
+  }
+  return seeds;
 }
 
 Polynomial Sum(const Polynomial& a, const Polynomial& b) {
@@ -298,31 +309,46 @@ TEST_P(PlanLaws, HoldOnRandomPrograms) {
   PlanOptions options;
   options.compensate = GetParam();
   Worst worst;
-  for (int seed = 1; seed <= ProgramCount(); ++seed) {
+  const Seeds seeds = WantedSeeds();
+  for (int seed = seeds.first; seed <= seeds.last; ++seed) {
     SCOPED_TRACE(seed);
     const std::string text = RandomProgram(static_cast<unsigned>(seed)).Make();
     const PlannedProgram planned = PlanPartProgram(text, m, options);
-    ASSERT_TRUE(planned.faults.empty()) << planned.faults[0].line << " " << planned.faults[0].reason << " "
-                                        << planned.faults[0].message << "\n"
-                                        << text;
+    if (!planned.faults.empty()) {
+      ADD_FAILURE() << planned.faults[0].line << " " << planned.faults[0].reason << " "
+                    << planned.faults[0].message;
+      continue;
+    }
     ExpectLimits(m, planned.plan, worst);
     ExpectContinuity(planned.plan);
     ExpectMonotone(planned.plan);
     ExpectClosedGates(planned.plan);
     ExpectContour(m, text, planned, worst);
-    if (HasFatalFailure()) {
-      break;
-    }
   }
   std::printf(
-      "%d random programs%s: limits sampled at 10 kHz reach at most %.9f; contour within %.5f mm, and missed "
+      "random programs %d to %d%s: limits sampled at 10 kHz reach at most %.9f; contour within %.5f mm, and "
+      "missed "
       "by at most %.5f of "
       "%.5f mm\n",
-      ProgramCount(), GetParam() ? ", compensated" : "", worst.limits, worst.planned_off_mm,
+      seeds.first, seeds.last, GetParam() ? ", compensated" : "", worst.limits, worst.planned_off_mm,
       worst.programmed_off_mm, m.path.corner_tolerance_mm);
 }
 
 INSTANTIATE_TEST_SUITE_P(Elastic, PlanLaws, testing::Values(false, true));
+
+// The idle move after the cut comes nearer to the last corner than the cut itself at first does. That it passes there is neither
+// a corner that is held nor one that slowing the idle move would mend.
+TEST(PlanLaws, AnIdleMoveThatComesByACornerIsNoCut) {
+  const MachineDescription m = DemoLikeMachine();
+  const std::string text =
+      "G21 G90 G17 F3532\nG0 X540.598 Y490.1\nM3 P0.3\nG1 X539.0008 Y489.4040\nG1 X522.7597 Y487.0470\n"
+      "G1 X522.4165 Y487.0889\nG1 X522.2451 Y487.1112\nG1 X522.5492 Y487.6213\nM5\n"
+      "G0 X319.379 Y175.951\nM3 P0.3\nG1 X310 Y170\nM5\nM2\n";
+  const PlannedProgram planned = PlanPartProgram(text, m, {});
+  ASSERT_TRUE(planned.faults.empty()) << planned.faults[0].reason << " " << planned.faults[0].message;
+  Worst worst;
+  ExpectContour(m, text, planned, worst);
+}
 
 TEST(PlanLaws, SameInputsSamePlan) {
   const MachineDescription m = DemoLikeMachine();

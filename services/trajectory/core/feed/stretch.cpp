@@ -587,9 +587,10 @@ class StretchPlanner {
   struct Corner {
     Vector2d p_mm;
     double s_mm;
+    double last_s_mm;  // where it may still be met: an idle move that happens to come by is no cut
     double tolerance_mm;
-    double nearest_mm;
-    double time_s;
+    double nearest_mm = 1e9;
+    double time_s = 0.0;
   };
 
   void FindCorners() {
@@ -597,17 +598,19 @@ class StretchPlanner {
     corner_at_ = 0;
     for (std::size_t i = 0; i < elements_.size(); ++i) {
       const std::vector<PathPiece>& pieces = elements_[i].pieces;
+      const double end_s_mm = planned_[i].begin_s_mm + planned_[i].length_mm;
       for (std::size_t k = 1; k < pieces.size(); ++k) {
         const Vector2d u = PointOn(pieces[k - 1], pieces[k - 1].length_mm).tangent;
         const PathPoint here = PointOn(pieces[k], 0.0);
         if (u.dot(here.tangent) < kCornerCosine) {
+          const double s_mm = planned_[i].begin_s_mm + pieces[k].begin_mm;
           corners_.push_back(
-              {here.p_mm, planned_[i].begin_s_mm + pieces[k].begin_mm, pieces[k].tolerance_mm, 1e9, 0.0});
+              {here.p_mm, s_mm, std::min(s_mm + kCornerLook_mm, end_s_mm), pieces[k].tolerance_mm});
         }
       }
       if (!pieces.empty() && FlowsOn(i)) {  // the end of a cut that is left at speed
-        corners_.push_back({elements_[i].to_mm, planned_[i].begin_s_mm + planned_[i].length_mm,
-                            pieces.back().tolerance_mm, 1e9, 0.0});
+        corners_.push_back(
+            {elements_[i].to_mm, end_s_mm, end_s_mm + kCornerLook_mm, pieces.back().tolerance_mm});
       }
     }
   }
@@ -618,6 +621,9 @@ class StretchPlanner {
     }
     const Vector2d d = b - a;
     for (std::size_t i = corner_at_; i < corners_.size() && corners_[i].s_mm <= s + kCornerLook_mm; ++i) {
+      if (s > corners_[i].last_s_mm) {
+        continue;
+      }
       const Vector2d r = corners_[i].p_mm - a;
       const double share = d.squaredNorm() > 0.0 ? std::clamp(r.dot(d) / d.squaredNorm(), 0.0, 1.0) : 0.0;
       const double distance = (r - share * d).norm();
