@@ -3,7 +3,7 @@
 #include <string>
 
 #include "clients/cli/csv.hpp"
-#include "clients/cli/feed_report.hpp"
+#include "clients/cli/plan_feed.hpp"
 #include "clients/cli/program_faults.hpp"
 #include "clients/cli/text_file.hpp"
 #include "clients/cli/tolerance_option.hpp"
@@ -181,7 +181,7 @@ void TellSummary(const PlannedProgram& p, Output& output) {
   output.Text(std::to_string(p.plan.segments.size()) + " segments, " + std::to_string(p.plan.gates.size()) +
               " gates, " + std::to_string(p.plan.events.size()) + " events; farthest from the contour " +
               Fixed(p.contour_deviation_mm, 4) + " mm");
-  TellFeed(p.binding, p.slow, output);
+  TellFeed(FeedOf(p.binding, p.slow), output);
 }
 
 CsvTable SampleTable(const PlannedProgram& p, double step_s) {

@@ -70,6 +70,8 @@ Colour ColourOf(FeedLimit limit) {
     case FeedLimit::kPathAcceleration:
     case FeedLimit::kPathJerk:
       return kSky;
+    case FeedLimit::kSmoothing:
+      return kDeepBlue;
     default:
       return kInk;
   }
@@ -122,9 +124,13 @@ PathColours ByLimit(const PlannedProgram& planned) {
     colours.of.push_back(ColourOf(slow == nullptr ? FeedLimit::kFeed : slow->limit));
   }
   colours.title = "toolpath by the limit that binds";
-  colours.legend = {
-      {"programmed feed held", kBluish},         {"path acceleration or jerk", kSky}, {"curvature", kAmber},
-      {"corner, contour tolerance", kVermilion}, {"predicted error", kPurple},        {"an actuator", kInk}};
+  colours.legend = {{"programmed feed held", kBluish},
+                    {"path acceleration or jerk", kSky},
+                    {"curvature", kAmber},
+                    {"corner, contour tolerance", kVermilion},
+                    {"predicted error", kPurple},
+                    {"an actuator", kInk},
+                    {"none reached: smoothing in time", kDeepBlue}};
   return colours;
 }
 

@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "clients/cli/csv.hpp"
+#include "clients/cli/feed_report.hpp"
 #include "clients/cli/service_verbs.hpp"
 #include "clients/cli/text_file.hpp"
 #include "clients/cli/tolerance_option.hpp"
@@ -173,16 +174,27 @@ void PrintLambda(const trajectory_v1::PlanSummary& plan, Output& output) {
                  {"predicted 95 % bound", Fixed(plan.predicted_95_mm(), 4), "mm"}}});
 }
 
+FeedReport FeedOf(const trajectory_v1::PlanSummary& plan) {
+  FeedReport report;
+  for (const trajectory_v1::BindingLimit& limit : plan.binding_limits()) {
+    report.lengths.push_back({limit.limit(), limit.length_mm()});
+  }
+  for (const trajectory_v1::SlowStretch& s : plan.slow_stretches()) {
+    SlowPlace place{s.line(),  s.from_s_mm(), s.to_s_mm(), s.programmed_mm_per_s(), s.lowest_mm_per_s(),
+                    s.limit(), std::nullopt};
+    if (s.has_reached_share()) {
+      place.reached = {s.nearest(), s.reached_share(), s.at_s_mm(), s.share()};
+    }
+    report.slow.push_back(std::move(place));
+  }
+  report.slow_count = plan.slow_stretch_count();
+  return report;
+}
+
 void PrintSummary(const trajectory_v1::PlanSummary& plan, Output& output) {
   plan.has_spatial() ? PrintSpatial(plan, output) : PrintLambda(plan, output);
-  TextTable limits{{"limit", "length_mm", "share_%"}, {}};
-  for (const trajectory_v1::BindingLimit& limit : plan.binding_limits()) {
-    limits.rows.push_back({limit.limit(), Fixed(limit.length_mm(), 1), Fixed(limit.share() * 100, 1)});
-  }
-  if (!limits.rows.empty()) {
-    output.Text("");
-    output.Table(limits);
-  }
+  output.Text("");
+  TellFeed(FeedOf(plan), output);
   TextTable held{
       {"contour", "lines", "tolerance_mm", "predicted_95_mm", "worst_mm", "at line", "left_mm", "most from"},
       {}};

@@ -9,8 +9,8 @@
 #include <optional>
 
 #include "clients/cli/csv.hpp"
-#include "clients/cli/feed_report.hpp"
 #include "clients/cli/picture.hpp"
+#include "clients/cli/plan_feed.hpp"
 #include "clients/cli/program_faults.hpp"
 #include "clients/cli/text_file.hpp"
 #include "platform/machine_file/hexapod_file.hpp"
@@ -83,7 +83,7 @@ void TellSummary(const PlannedSpatialProgram& p, Output& output) {
                   p.turn_deviation_rad));
   output.Text(fmt::format("struts between {:.1f} and {:.1f} mm; smallest singular margin {:.3f} mm/mm",
                           p.shortest_mm.minCoeff(), p.longest_mm.maxCoeff(), p.singular_margin_ratio));
-  TellFeed(p.binding, p.slow, output);
+  TellFeed(FeedOf(p.binding, p.slow), output);
 }
 
 nlohmann::json SummaryJson(const PlannedSpatialProgram& p) {

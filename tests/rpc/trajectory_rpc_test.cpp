@@ -49,6 +49,47 @@ TEST_F(TrajectoryServiceTest, AdmitsStepByStepAndThePlanStays) {
   EXPECT_EQ(found.summary().duration_s(), plan.duration_s());
 }
 
+std::string Shipped(const std::string& name) {
+  std::ostringstream text;
+  text << std::ifstream(test::SourceDir() + "/deploy/parts/" + name).rdbuf();
+  EXPECT_FALSE(text.str().empty()) << name;
+  return text.str();
+}
+
+// Short legs at right angles: more slow stretches than one answer carries.
+std::string Zigzag(int legs) {
+  std::string program = "G21 G90\nG0 X200 Y200\nM3 P0.3\nF3600\n";
+  for (int i = 1; i <= legs; ++i) {
+    program += "G1 X" + std::to_string(200 + (i + 1) / 2) + " Y" + std::to_string(200 + i / 2) + "\n";
+  }
+  return program + "M5\nM2\n";
+}
+
+TEST_F(TrajectoryServiceTest, TellsWhereTheFeedIsNotHeldAsTheCoreKnowsIt) {
+  for (const std::string& program : {std::string(kPlate), Shipped("bracket.ngc"), Zigzag(260)}) {
+    const v1::PlanSummary told = PlanAndWait(program).summary();
+    const std::vector<SlowStretch> known = PlanToTolerance(program, *machine_, {}).planned.slow;
+    ASSERT_GT(known.size(), 0u);
+    EXPECT_EQ(told.slow_stretch_count(), known.size());
+    ASSERT_EQ(static_cast<std::size_t>(told.slow_stretches_size()), std::min<std::size_t>(known.size(), 200));
+    for (int i = 0; i < told.slow_stretches_size(); ++i) {
+      const v1::SlowStretch& wire = told.slow_stretches(i);
+      const SlowStretch& core = known[static_cast<std::size_t>(i)];
+      EXPECT_EQ(wire.from_s_mm(), core.from_s_mm);
+      EXPECT_EQ(wire.to_s_mm(), core.to_s_mm);
+      EXPECT_EQ(wire.line(), core.line);
+      EXPECT_EQ(wire.limit(), FeedLimitName(core.limit));
+      EXPECT_EQ(wire.programmed_mm_per_s(), core.programmed_mm_per_s);
+      EXPECT_EQ(wire.lowest_mm_per_s(), core.lowest_mm_per_s);
+      EXPECT_EQ(wire.nearest(), FeedLimitName(core.nearest));
+      EXPECT_TRUE(wire.has_reached_share() && wire.has_at_s_mm() && wire.has_share());
+      EXPECT_EQ(wire.reached_share(), core.reached_share);
+      EXPECT_EQ(wire.at_s_mm(), core.at_s_mm);
+      EXPECT_EQ(wire.share(), core.share);
+    }
+  }
+}
+
 TEST_F(TrajectoryServiceTest, StopsAtTheStepThatRefuses) {
   const auto refusing = [this](const std::string& program, const v1::PlanOptions& options, const char* step,
                                const char* reason, std::uint32_t line) {
@@ -164,13 +205,6 @@ TEST_F(TrajectoryServiceTest, ExportsAPlansPoints) {
   EXPECT_EQ(csv.rfind("tau_s,s_mm,x_W_mm", 0), 0u);
   EXPECT_NEAR(static_cast<double>(std::count(csv.begin(), csv.end(), '\n')),
               plan.summary().duration_s() / 0.01 + 2, 1.5);
-}
-
-std::string Shipped(const std::string& name) {
-  std::ostringstream text;
-  text << std::ifstream(test::SourceDir() + "/deploy/parts/" + name).rdbuf();
-  EXPECT_FALSE(text.str().empty()) << name;
-  return text.str();
 }
 
 // A program in one of the formats, with what a drawing needs to be cut.

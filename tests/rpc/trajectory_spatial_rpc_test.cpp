@@ -136,6 +136,14 @@ TEST_F(SpatialServiceTest, AdmitsStepByStepAndThePlanIsThatOfTheCore) {
   EXPECT_EQ(plan.model_version().hash(), own_->hash);
   EXPECT_EQ(plan.spatial().longest_strut_mm(), core.longest_mm.maxCoeff());
   EXPECT_GT(plan.spatial().singular_margin_ratio(), 0.15);
+  EXPECT_GT(core.slow.size(), 0u);
+  EXPECT_EQ(plan.slow_stretch_count(), core.slow.size());
+  for (const v1::SlowStretch& slow : plan.slow_stretches()) {
+    EXPECT_FALSE(slow.limit().empty());
+    EXPECT_TRUE(slow.nearest().empty() && !slow.has_reached_share() && !slow.has_at_s_mm() &&
+                !slow.has_share())
+        << "what is not measured of a hexapod's plan is absent";
+  }
   EXPECT_EQ(PlanAndWait(Holes()).summary().plan_id(), plan.plan_id());
   v1::ListPlansResponse listed;
   ASSERT_TRUE(Call(&Stub::ListPlans, *stub_, v1::ListPlansRequest(), listed).ok());

@@ -122,9 +122,7 @@ void ToWire(const PlannedSpatialProgram& p, const HexapodModel& hexapod, v1::Pla
     to.set_length_mm(binding.length_mm);
     to.set_share(p.plan.length_mm > 0.0 ? binding.length_mm / p.plan.length_mm : 0.0);
   }
-  for (std::size_t i = 0; i < p.slow.size() && i < kMostSlowStretches; ++i) {
-    ToWire(p.slow[i], *wire.add_slow_stretches());
-  }
+  ToWire(p.slow, wire);
   v1::SpatialSummary& spatial = *wire.mutable_spatial();
   spatial.set_turn_radius_mm(p.plan.turn_radius_mm);
   spatial.set_turn_deviation_rad(p.turn_deviation_rad);

@@ -130,6 +130,8 @@ void ToWire(const PlanRecord& record, type::v1::Operation& wire) {
   }
 }
 
+namespace {
+
 void ToWire(const SlowStretch& slow, v1::SlowStretch& wire) {
   wire.set_from_s_mm(slow.from_s_mm);
   wire.set_to_s_mm(slow.to_s_mm);
@@ -137,9 +139,13 @@ void ToWire(const SlowStretch& slow, v1::SlowStretch& wire) {
   wire.set_limit(Word(FeedLimitName(slow.limit)));
   wire.set_programmed_mm_per_s(slow.programmed_mm_per_s);
   wire.set_lowest_mm_per_s(slow.lowest_mm_per_s);
+  if (slow.reached_share > 0.0) {  // measured
+    wire.set_nearest(Word(FeedLimitName(slow.nearest)));
+    wire.set_reached_share(slow.reached_share);
+    wire.set_at_s_mm(slow.at_s_mm);
+    wire.set_share(slow.share);
+  }
 }
-
-namespace {
 
 void ToWire(const HeldTolerance& held, v1::HeldTolerance& wire) {
   wire.set_contour(held.contour);
@@ -154,6 +160,13 @@ void ToWire(const HeldTolerance& held, v1::HeldTolerance& wire) {
 }
 
 }  // namespace
+
+void ToWire(const std::vector<SlowStretch>& slow, v1::PlanSummary& wire) {
+  for (std::size_t i = 0; i < slow.size() && i < kMostSlowStretches; ++i) {
+    ToWire(slow[i], *wire.add_slow_stretches());
+  }
+  wire.set_slow_stretch_count(static_cast<std::uint32_t>(slow.size()));
+}
 
 void ToWire(const PlanRecord& record, v1::PlanSummary& wire) {
   const PlannedProgram& p = *record.planned;
@@ -184,9 +197,7 @@ void ToWire(const PlanRecord& record, v1::PlanSummary& wire) {
     to.set_share(total_mm > 0.0 ? binding.length_mm / total_mm : 0.0);
   }
   wire.set_predicted_95_mm(record.predicted_95_mm);
-  for (std::size_t i = 0; i < p.slow.size() && i < kMostSlowStretches; ++i) {
-    ToWire(p.slow[i], *wire.add_slow_stretches());
-  }
+  ToWire(p.slow, wire);
   wire.set_fastest_s(record.tolerance.fastest_s);
   for (const HeldTolerance& held : record.tolerance.held) {
     ToWire(held, *wire.add_held_tolerances());

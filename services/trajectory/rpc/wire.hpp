@@ -19,7 +19,8 @@ Admission AdmitMade(const MadeProgram& program, const MachineDescription& machin
 void ToWire(const MachineDescription& machine, machine::v1::ModelVersion& wire);
 void ToWire(const ProgramFault& fault, v1::ProgramFault& wire);
 void ToWire(const Admission& admission, const MachineDescription& machine, v1::AdmitProgramResponse& wire);
-void ToWire(const SlowStretch& slow, v1::SlowStretch& wire);
+// At most kMostSlowStretches of them, and how many there are.
+void ToWire(const std::vector<SlowStretch>& slow, v1::PlanSummary& wire);
 void ToWire(const PlanRecord& record, type::v1::Operation& wire);
 void ToWire(const PlanRecord& record, v1::PlanSummary& wire);
 void ToWire(const PlanRecord& record, v1::GetPlanResponse& wire);
