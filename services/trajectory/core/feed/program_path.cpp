@@ -20,8 +20,12 @@ class PathBuilder {
       : defaults_(defaults), tolerance_mm_(defaults.tolerance_mm) {}
 
   ProgramPath Build(const std::vector<Operation>& operations) {
-    for (const Operation& o : operations) {
-      Take(o);
+    for (std::size_t i = 0; i < operations.size(); ++i) {
+      const bool had_run = run_;
+      Take(operations[i]);
+      if (run_ && !had_run) {
+        ReserveRun(operations, i);
+      }
     }
     CloseRun();
     if (!pending_.empty()) {  // events after the last motion belong to its end
@@ -31,6 +35,16 @@ class PathBuilder {
   }
 
  private:
+  // A run of a million pieces is not to be held twice while it grows.
+  void ReserveRun(const std::vector<Operation>& operations, std::size_t first) {
+    std::size_t end = first;
+    while (end < operations.size() && (operations[end].kind == OperationKind::kFeedLine ||
+                                       operations[end].kind == OperationKind::kFeedArc)) {
+      ++end;
+    }
+    run_element().pieces.reserve(end - first);
+  }
+
   void Take(const Operation& o) {
     switch (o.kind) {
       case OperationKind::kTraverse:

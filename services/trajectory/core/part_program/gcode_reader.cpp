@@ -1,5 +1,6 @@
 #include "trajectory/core/part_program/gcode_reader.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <memory>
@@ -24,7 +25,8 @@ class Reader {
 
   PartProgram Read() {
     if (!RefuseEncoding()) {
-      r_.program.operations.reserve(std::min(text_.size() / 24 + 16, options_.operation_limit));
+      const auto lines = static_cast<std::size_t>(std::count(text_.begin(), text_.end(), '\n'));
+      r_.program.operations.reserve(std::min(lines + 16, options_.operation_limit));
       while (!r_.ended && at_ < text_.size() && GoOn()) {
         NextLine();
         ReadLine();

@@ -290,7 +290,9 @@ class KerfCompensation {
 }  // namespace
 
 PartProgram CompensateKerf(PartProgram program) {
-  if (!program.faults.empty()) {
+  const bool compensated = std::any_of(program.operations.begin(), program.operations.end(),
+                                       [](const Operation& o) { return o.kerf_offset_mm != 0.0; });
+  if (!program.faults.empty() || !compensated) {  // a long program is not copied for nothing
     return program;
   }
   return KerfCompensation(std::move(program)).Run();
