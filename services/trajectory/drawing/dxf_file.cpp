@@ -16,6 +16,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <exception>
 #include <memory>
 #include <numbers>
@@ -34,6 +35,18 @@ constexpr std::size_t kMostEntities = 200'000;
 constexpr std::size_t kMostCurves = 2'000'000;
 constexpr int kHighestDegree = 15;
 constexpr double kFlat = 1e-6;  // what may differ in Z
+constexpr double kFarthest_mm = 1e6;
+
+// From the origin, at most.
+double FarthestOf(const LineCurve& c) { return std::max(c.from.norm(), c.to.norm()); }
+double FarthestOf(const ConicCurve& c) { return c.center.norm() + c.u.norm() + c.v.norm(); }
+double FarthestOf(const SplineCurve& c) {
+  double farthest = 0.0;
+  for (const Vector2d& p : c.points) {
+    farthest = std::max(farthest, p.norm());
+  }
+  return farthest;
+}
 
 // $INSUNITS, from the DXF reference.
 double UnitMm(int code) {
@@ -153,7 +166,7 @@ class DxfReader {
   }
 
   void Keep() {
-    if (curves_.empty()) {
+    if (curves_.empty() || !Near()) {
       return;
     }
     curve_count_ += curves_.size();
@@ -163,6 +176,25 @@ class DxfReader {
       Tell("DXF_TOO_LARGE", "", 0, "the drawing has more than 200000 entities or two million curves");
       full_ = true;
     }
+  }
+
+  // Contours of whole countries cost hours to compare with each other, and no sheet holds them.
+  bool Near() {
+    double farthest = 0.0;
+    for (const Curve& curve : curves_) {
+      farthest = std::max(farthest, std::visit([](const auto& c) { return FarthestOf(c); }, curve));
+    }
+    const double farthest_mm = farthest * (drawing_.unit_mm > 0.0 ? drawing_.unit_mm : 1.0);
+    if (farthest_mm > kFarthest_mm) {
+      char text[160];
+      std::snprintf(text, sizeof text,
+                    "reaches %.3g m from the origin, 1000 m is the most; move the drawing to the origin, or "
+                    "mend its unit",
+                    farthest_mm / 1e3);
+      Tell("ENTITY_TOO_FAR", type_, line_, text);
+      return false;
+    }
+    return true;
   }
 
   void Push(const AffineMap& map, const Curve& curve) { curves_.push_back(Mapped(map, curve)); }

@@ -31,12 +31,14 @@ bool AddOffsetChange(Reading& r) {
   }
   Operation& o = r.Add(OperationKind::kWorkOffsetChange);
   constexpr double kDegree = 0.017453292519943295;
-  o.x_W_mm = s.zero[0];
-  o.y_W_mm = s.zero[1];
-  o.z_W_mm = s.zero[2];
-  o.a_rad = kDegree * s.zero[3];
-  o.b_rad = kDegree * s.zero[4];
-  o.c_rad = kDegree * s.zero[5];
+  // Parameters may hold offsets of axes that the machine does not have; they move nothing.
+  const auto zero = [&](std::size_t axis) { return r.drives(axis) ? s.zero[axis] : 0.0; };
+  o.x_W_mm = zero(0);
+  o.y_W_mm = zero(1);
+  o.z_W_mm = zero(2);
+  o.a_rad = kDegree * zero(3);
+  o.b_rad = kDegree * zero(4);
+  o.c_rad = kDegree * zero(5);
   o.value = kOffsetNames[s.offset];
   return true;
 }
