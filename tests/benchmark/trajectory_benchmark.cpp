@@ -1,6 +1,7 @@
 // Prints what reading and planning cost beside baselines of the same run, and how near to the limits the plans come:
 // lines a second, blocks a second, nanoseconds a grid point, duration against the time-optimal bound, feed held on circles
-// of short blocks, elastic error removed.
+// of short blocks, elastic error removed. `benchmark_trajectory [PART|BLOCKS]…`: only these; the peak of memory is the whole
+// process's, so that of a size is measured by a run with nothing else.
 #include <sys/resource.h>
 
 #include <algorithm>
@@ -11,10 +12,12 @@
 #include <ctime>
 #include <numbers>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "tests/laws/trajectory_cases.hpp"
 #include "tests/laws/trajectory_spatial_reference.hpp"
+#include "tests/support/figure.hpp"
 #include "trajectory/core/feed/early_plan.hpp"
 #include "trajectory/core/feed/plan_program.hpp"
 #include "trajectory/core/feed/plan_samples.hpp"
@@ -24,6 +27,8 @@
 
 namespace lambdajet::trajectory {
 namespace {
+
+using tests::PrintFigure;
 
 template <class Work>
 double Seconds(Work work, int repeats = 3) {
@@ -78,7 +83,8 @@ double ProcessorSeconds(Work work, int repeats = 5) {
   return best;
 }
 
-void Reading(const char* what, const std::string& text, const GcodeOptions& options, double lines) {
+void Reading(const char* what, const char* figure, const std::string& text, const GcodeOptions& options,
+             double lines) {
   std::size_t operations = 0;
   const double ours = ProcessorSeconds([&] { operations = ReadGcode(text, options).operations.size(); });
   double sum = 0.0;
@@ -86,15 +92,16 @@ void Reading(const char* what, const std::string& text, const GcodeOptions& opti
   std::printf(
       "read %.0f lines of %s: %.2f million lines/s; strtod alone %.2f (ratio %.2f)  [%zu operations, %.0f]\n",
       lines, what, 1e-6 * lines / ours, 1e-6 * lines / baseline, baseline / ours, operations, sum);
+  PrintFigure(figure, lines / ours);
 }
 
 void Reading() {
   constexpr int kLines = 1'000'000;
   GcodeOptions options;
-  Reading("G1", CircleOfShortBlocks(kLines, 20, 0.02, 6000), options, kLines);
+  Reading("G1", "read.g1_lines_per_s", CircleOfShortBlocks(kLines, 20, 0.02, 6000), options, kLines);
   options.axes = kSixAxes;
-  Reading("five axes", FiveAxisBlocks(kLines), options, kLines);
-  Reading("expressions in a loop",
+  Reading("five axes", "read.five_axis_lines_per_s", FiveAxisBlocks(kLines), options, kLines);
+  Reading("expressions in a loop", "read.loop_lines_per_s",
           "#1=0\nG1 F600\no1 while [#1 LT 200000]\nX[100*COS[#1/100]] Y[100*SIN[#1/100]]\n#1=[#1+1]\no1 "
           "endwhile\nM2\n",
           options, 4 * 200'000);
@@ -126,6 +133,7 @@ void Moves() {
       "(ratios %.2f, %.2f)  [%.3g %.3g]\n",
       1e9 * pair / kMoves, 1e9 * general / kMoves, 1e9 * roots / kMoves, pair / roots, general / roots, sum,
       floor);
+  PrintFigure("move.pair_ns", 1e9 * pair / kMoves);
 }
 
 double PeakMemoryMib() {
@@ -172,17 +180,26 @@ void Planning(int blocks) {
       "%.1f ms), all after %.2f s\n",
       blocks, wall, processor, blocks / wall, blocks / processor, peak, segments, faults, 1e3 * first_wall,
       1e3 * first_processor, streamed.wall_s());
+  PrintFigure("plan.blocks_per_s", blocks / wall);
+  PrintFigure("plan.blocks_per_processor_s", blocks / processor);
+  PrintFigure("plan.first_segment_ms", 1e3 * first_wall);
+  PrintFigure("plan.peak_memory_mib", peak);
+  PrintFigure("plan.faults", static_cast<double>(faults));
 }
 
-void FeedHeld(const char* name, const std::string& text, const std::vector<Eigen::Vector2d>& centres_mm) {
+void FeedHeld(const char* name, const char* figure, const std::string& text,
+              const std::vector<Eigen::Vector2d>& centres_mm) {
   const MachineDescription m = DemoLikeMachine();
-  const double held = MeanSpeed(PlanPartProgram(text, m, {}));
+  PlanOptions options;
+  options.knot_s = 0.001;
+  const double held = MeanSpeed(PlanPartProgram(text, m, options));
   const double bound = FastestMeanSpeed(m, 100.0, 20.0, centres_mm);
   std::printf(
       "%s R20 in 0.02 mm blocks, 100 mm/s programmed: %.1f mm/s, %.1f %% of %.1f mm/s, which feed, curvature "
       "and actuator "
       "speeds allow\n",
       name, held, 100 * held / bound, bound);
+  PrintFigure(figure, held / bound);
 }
 
 void PathTiming() {
@@ -231,6 +248,8 @@ void PathTimingOf() {
       "%.0f); durations "
       "differ by at most %.1e\n",
       N, 1e9 * ours_s / points, 1e9 * plain_s / points, plain_s / ours_s, worst);
+  PrintFigure(N == 2 ? "timing.two_ns" : "timing.six_ns", 1e9 * ours_s / points);
+  PrintFigure(N == 2 ? "timing.two_duration_off" : "timing.six_duration_off", worst);
 }
 
 // A long square with jerk made inactive: against the bound that starts, corners and stops at standstill cost.
@@ -248,6 +267,7 @@ void AgainstBound() {
   const double bound = 800.0 / v + 2 * v / (2 * a) + 3 * (v - corner) * (v - corner) / (v * a);
   std::printf("square of 800 mm at 100 mm/s, jerk inactive: %.4f s, time-optimal bound %.4f s, ratio %.4f\n",
               p.plan.duration_s, bound, p.plan.duration_s / bound);
+  PrintFigure("bound.square_ratio", p.plan.duration_s / bound);
 }
 
 void FeedForward() {
@@ -257,6 +277,49 @@ void FeedForward() {
       "parameters, %.2f %% with "
       "stiffness 10 %% wrong\n",
       figures.untreated_mm, 100 * figures.removed_exact, 100 * figures.removed_wrong);
+  PrintFigure("elastic.removed_exact", figures.removed_exact);
+  PrintFigure("elastic.removed_wrong_stiffness", figures.removed_wrong);
+}
+
+struct Part {
+  std::string_view name;
+  void (*run)();
+};
+
+void Timing() {
+  PathTiming();
+  PathTimingOf<2>();
+  PathTimingOf<6>();
+}
+
+void Feed() {
+  FeedHeld("circle", "feed.circle_share", CircleOfShortBlocks(20000, 20, 0.02, 6000), {{400, 300}});
+  FeedHeld("figure-eight", "feed.eight_share", FigureEight(20000, 20, 0.02, 6000), {{420, 300}, {380, 300}});
+}
+
+void AllPlanning() {
+  for (const int blocks :
+       {100'000, 300'000, 1'000'000}) {  // growing, for the peak of memory is the process's
+    Planning(blocks);
+  }
+}
+
+constexpr Part kParts[] = {{"move", Moves},      {"read", [] { Reading(); }}, {"timing", Timing},
+                           {"feed", Feed},       {"bound", AgainstBound},     {"elastic", FeedForward},
+                           {"plan", AllPlanning}};
+
+bool Run(std::string_view word) {
+  if (const int blocks = std::atoi(word.data()); blocks > 0) {
+    Planning(blocks);
+    return true;
+  }
+  for (const Part& part : kParts) {
+    if (part.name == word) {
+      part.run();
+      return true;
+    }
+  }
+  return false;
 }
 
 }  // namespace
@@ -264,19 +327,16 @@ void FeedForward() {
 
 int main(int count, char** words) {
   using namespace lambdajet::trajectory;
-  Moves();
-  Reading();
-  PathTiming();
-  PathTimingOf<2>();
-  PathTimingOf<6>();
-  FeedHeld("circle", CircleOfShortBlocks(20000, 20, 0.02, 6000), {{400, 300}});
-  FeedHeld("figure-eight", FigureEight(20000, 20, 0.02, 6000), {{420, 300}, {380, 300}});
-  AgainstBound();
-  FeedForward();
-  for (const int blocks :
-       {100'000, 300'000, 1'000'000}) {  // growing, for the peak of memory is the process's
-    if (count == 1 || blocks <= std::atoi(words[1])) {
-      Planning(blocks);
+  for (const Part& part : kParts) {
+    if (count == 1) {
+      part.run();
+    }
+  }
+  for (int i = 1; i < count; ++i) {
+    if (!Run(words[i])) {
+      std::fprintf(stderr, "%s: not a number of blocks, nor move, read, timing, feed, bound, elastic, plan\n",
+                   words[i]);
+      return 2;
     }
   }
 }

@@ -6,6 +6,7 @@
 #include <random>
 #include <vector>
 
+#include "tests/support/figure.hpp"
 #include "trajectory/core/idle_motion/jerk_limited_move.hpp"
 
 namespace lambdajet::trajectory {
@@ -134,6 +135,7 @@ double SearchedTime(const Case& c) {
 
 TEST(JerkLimitedMove, IsAsQuickAsTheSearchedOptimum) {
   std::mt19937_64 random(2);
+  double worst = 0.0;
   for (int i = 0; i < 200; ++i) {
     const Case c = RandomCase(random, i % 2 == 0);
     SCOPED_TRACE(i);
@@ -141,7 +143,9 @@ TEST(JerkLimitedMove, IsAsQuickAsTheSearchedOptimum) {
     const double searched = SearchedTime(c);
     EXPECT_LE(ours, searched * (1 + 1e-6));
     EXPECT_GE(ours, searched * (1 - 1e-6)) << "quicker than the search: limits or search are wrong";
+    worst = std::max(worst, std::abs(ours / searched - 1.0));
   }
+  tests::PrintFigure("move.off_optimum", worst);
 }
 
 TEST(JerkLimitedMove, KnownMoves) {

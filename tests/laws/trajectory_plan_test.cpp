@@ -6,17 +6,24 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <numbers>
 #include <vector>
 
 #include "kinematics/core/lambda_mechanism.hpp"
 #include "tests/laws/trajectory_cases.hpp"
+#include "tests/support/demo_machine.hpp"
+#include "tests/support/figure.hpp"
 #include "trajectory/core/feed/early_plan.hpp"
 #include "trajectory/core/feed/plan_program.hpp"
-#include "trajectory/core/part_program/gcode_reader.hpp"
+#include "trajectory/core/part_program/read_program.hpp"
 
 namespace lambdajet::trajectory {
 namespace {
+
+using tests::PrintFigure;
 
 constexpr double kRelative = 1e-6;
 
@@ -220,14 +227,17 @@ class Polyline {
   std::vector<Point> points_;
 };
 
-// Each cut, from its pierce to where its jet goes off, as programmed: chords of arcs within ten nanometres.
-std::vector<Polyline> ProgrammedCuts(const std::string& text, const Plan& plan) {
+// Each cut, from its pierce to where its jet goes off, as programmed, kerf and all: chords of arcs within ten nanometres.
+std::vector<Polyline> ProgrammedCuts(const MachineDescription& m, const std::string& text, const Plan& plan) {
+  ReadOptions reading;
+  reading.compensate_kerf = true;
+  reading.gcode.kerf_width_mm = m.process.kerf_width_mm;
   std::vector<Polyline> cuts;
   std::size_t gate = 0;
   Eigen::Vector2d at = Eigen::Vector2d::Zero();
   double s = 0.0;
   bool on = false;
-  for (const Operation& o : ReadGcode(text).operations) {
+  for (const Operation& o : ReadPartProgram(text, reading).operations) {
     const Eigen::Vector2d to{o.x_W_mm, o.y_W_mm}, centre{o.center_x_W_mm, o.center_y_W_mm};
     if (o.kind == OperationKind::kPierce) {
       while (plan.gates[gate].kind != GateKind::kPierce) {
@@ -267,7 +277,7 @@ std::vector<Polyline> ProgrammedCuts(const std::string& text, const Plan& plan) 
 void ExpectContour(const MachineDescription& m, const std::string& text, const PlannedProgram& planned,
                    Worst& worst) {
   const Jet jet(m);
-  const std::vector<Polyline> programmed = ProgrammedCuts(text, planned.plan);
+  const std::vector<Polyline> programmed = ProgrammedCuts(m, text, planned.plan);
   ASSERT_FALSE(programmed.empty());
   double off = 0.0, missed = 0.0;
   std::size_t segment = 0;
@@ -304,34 +314,65 @@ void ExpectContour(const MachineDescription& m, const std::string& text, const P
 
 class PlanLaws : public testing::TestWithParam<bool> {};
 
+void ExpectLaws(const MachineDescription& m, const std::string& text, bool compensate, Worst& worst) {
+  PlanOptions options;
+  options.compensate = compensate;
+  const PlannedProgram planned = PlanPartProgram(text, m, options);
+  ASSERT_TRUE(planned.faults.empty())
+      << planned.faults[0].line << " " << planned.faults[0].reason << " " << planned.faults[0].message << "\n"
+      << text;
+  ExpectLimits(m, planned.plan, worst);
+  ExpectContinuity(planned.plan);
+  ExpectMonotone(planned.plan);
+  ExpectClosedGates(planned.plan);
+  ExpectContour(m, text, planned, worst);
+}
+
+void Tell(const char* what, std::size_t count, bool compensate, const MachineDescription& m,
+          const Worst& worst) {
+  std::printf(
+      "%zu %s programs%s: limits sampled at 10 kHz reach at most %.9f; contour within %.5f mm, and missed "
+      "by at most %.5f of "
+      "%.5f mm\n",
+      count, what, compensate ? ", compensated" : "", worst.limits, worst.planned_off_mm,
+      worst.programmed_off_mm, m.path.corner_tolerance_mm);
+  const std::string group = std::string(what) + (compensate ? ".compensated_" : ".");
+  PrintFigure((group + "programs").c_str(), static_cast<double>(count));
+  PrintFigure((group + "limits_exceeded").c_str(), worst.limits - 1.0);
+  PrintFigure((group + "contour_share").c_str(),
+              std::max(worst.planned_off_mm, worst.programmed_off_mm) / m.path.corner_tolerance_mm);
+}
+
 TEST_P(PlanLaws, HoldOnRandomPrograms) {
   const MachineDescription m = DemoLikeMachine();
-  PlanOptions options;
-  options.compensate = GetParam();
   Worst worst;
   const Seeds seeds = WantedSeeds();
   for (int seed = seeds.first; seed <= seeds.last; ++seed) {
     SCOPED_TRACE(seed);
-    const std::string text = RandomProgram(static_cast<unsigned>(seed)).Make();
-    const PlannedProgram planned = PlanPartProgram(text, m, options);
-    if (!planned.faults.empty()) {
-      ADD_FAILURE() << planned.faults[0].line << " " << planned.faults[0].reason << " "
-                    << planned.faults[0].message;
-      continue;
-    }
-    ExpectLimits(m, planned.plan, worst);
-    ExpectContinuity(planned.plan);
-    ExpectMonotone(planned.plan);
-    ExpectClosedGates(planned.plan);
-    ExpectContour(m, text, planned, worst);
+    ExpectLaws(m, RandomProgram(static_cast<unsigned>(seed)).Make(), GetParam(), worst);
   }
-  std::printf(
-      "random programs %d to %d%s: limits sampled at 10 kHz reach at most %.9f; contour within %.5f mm, and "
-      "missed "
-      "by at most %.5f of "
-      "%.5f mm\n",
-      seeds.first, seeds.last, GetParam() ? ", compensated" : "", worst.limits, worst.planned_off_mm,
-      worst.programmed_off_mm, m.path.corner_tolerance_mm);
+  std::printf("seeds %d to %d: ", seeds.first, seeds.last);
+  Tell("random", static_cast<std::size_t>(seeds.last - seeds.first + 1), GetParam(), m, worst);
+}
+
+// Every program shipped for the sheet's mechanism, on the machine that is shipped with them.
+TEST_P(PlanLaws, HoldOnShippedPrograms) {
+  const MachineDescription m = tests::DemoMachine();
+  const std::string folder = std::string(std::getenv("LAMBDAJET_SOURCE_DIR")) + "/deploy/parts";
+  Worst worst;
+  std::size_t count = 0;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
+    const std::string kind = entry.path().extension();
+    if ((kind != ".ngc" && kind != ".cldata") || entry.path().stem() == "tilted_holes") {
+      continue;  // the last is a hexapod's
+    }
+    SCOPED_TRACE(entry.path());
+    std::ifstream file(entry.path());
+    ExpectLaws(m, {std::istreambuf_iterator<char>(file), {}}, GetParam(), worst);
+    ++count;
+  }
+  EXPECT_GE(count, 8u);
+  Tell("shipped", count, GetParam(), m, worst);
 }
 
 INSTANTIATE_TEST_SUITE_P(Elastic, PlanLaws, testing::Values(false, true));
@@ -409,6 +450,8 @@ TEST(FeedLaw, ShortBlocksHoldTheFeed) {
                        FastestMeanSpeed(m, 100.0, 20.0, {{420, 300}, {380, 300}});
   std::printf("feed held in 0.02 mm blocks: circle %.2f %%, figure-eight %.2f %% of the bound\n",
               100 * circle, 100 * eight);
+  PrintFigure("feed.circle_share", circle);
+  PrintFigure("feed.eight_share", eight);
   EXPECT_GE(circle, 0.95);
   EXPECT_GE(eight, 0.95);
   EXPECT_LE(circle, 1.0 + 1e-4);
@@ -431,6 +474,7 @@ TEST(FeedLaw, NearTheQuickestThatSpeedAndAccelerationAllow) {
     std::string text;
     double bound_s;
   };
+  double worst = 0.0;
   for (const Case& c : {Case{"line", head + "G1 X700\nM2\n", 400 / v + v / a},
                         Case{"circle R20, five times", head + "G3 X300 Y200 I0 J20 P5\nM2\n",
                              5 * 40 * std::numbers::pi / v + v / a},
@@ -443,13 +487,17 @@ TEST(FeedLaw, NearTheQuickestThatSpeedAndAccelerationAllow) {
                 c.bound_s, ratio);
     EXPECT_LE(ratio, 1.03);
     EXPECT_GE(ratio, 1.0);
+    worst = std::max(worst, ratio);
   }
+  PrintFigure("bound.ratio", worst);
 }
 
 TEST(ElasticLaw, FeedForwardMakesTheSheetFollow) {
   const ElasticFigures figures = MeasureFeedForward();
   std::printf("elastic error %.4f mm rms; removed %.2f %%, with stiffness 10 %% wrong %.2f %%\n",
               figures.untreated_mm, 100 * figures.removed_exact, 100 * figures.removed_wrong);
+  PrintFigure("elastic.removed_exact", figures.removed_exact);
+  PrintFigure("elastic.removed_wrong_stiffness", figures.removed_wrong);
   EXPECT_GE(figures.removed_exact, 0.95);
   EXPECT_GE(figures.removed_wrong, 0.80);
 }
