@@ -16,6 +16,7 @@
 #include "tests/laws/trajectory_cases.hpp"
 #include "tests/support/demo_machine.hpp"
 #include "tests/support/figure.hpp"
+#include "trajectory/core/feed/binding.hpp"
 #include "trajectory/core/feed/early_plan.hpp"
 #include "trajectory/core/feed/plan_program.hpp"
 #include "trajectory/core/part_program/read_program.hpp"
@@ -555,8 +556,8 @@ class Played {
   std::size_t segment_ = 0;
 };
 
-// Where a plan says that a limit of motion slows it, what is played reaches that limit within 1 % at the place it names, and
-// where it says that the smoothing keeps it below, below by as much as it says.
+// Where a plan says that a limit of motion slows it, what is played uses as much of that limit at the place it names as it says,
+// within 1 %, nine tenths at least; where it says that the smoothing keeps it below all, as much of the nearest as it says.
 TEST(BindingLaw, WhatIsNamedIsReachedWhereItIsNamed) {
   MachineDescription tight = DemoLikeMachine();
   tight.machine_id = "tight";
@@ -587,11 +588,13 @@ TEST(BindingLaw, WhatIsNamedIsReachedWhereItIsNamed) {
         }
         ++checked;
         const bool reached = slow.limit != FeedLimit::kSmoothing;
-        EXPECT_GE(share, slow.reached_share - 0.01) << FeedLimitName(slow.nearest) << " at " << slow.at_s_mm;
+        EXPECT_GE(share, slow.reached_share - (reached ? 0.01 : 0.02))
+            << FeedLimitName(slow.nearest) << " at " << slow.at_s_mm;
         worst_off = std::max(worst_off, slow.reached_share - share);
-        EXPECT_TRUE(!reached || share >= 0.99) << share << " of " << FeedLimitName(slow.limit) << " at "
-                                               << slow.at_s_mm << " line " << slow.line;
-        EXPECT_TRUE(reached || slow.reached_share < 0.992);
+        EXPECT_TRUE(!reached || share >= kLimitReached - 0.01)
+            << share << " of " << FeedLimitName(slow.limit) << " at " << slow.at_s_mm << " line "
+            << slow.line;
+        EXPECT_EQ(reached, slow.reached_share >= kLimitReached);
       }
       for (const BindingLength& b : planned.binding) {
         cut_mm += b.length_mm;

@@ -4,12 +4,8 @@
 
 namespace lambdajet::trajectory {
 
-double ReachedFrom(FeedLimit limit) {
-  return limit == FeedLimit::kCorner || limit == FeedLimit::kContourTolerance ? 0.95 : 0.991;
-}
-
 void FeedMoment::Offer(FeedLimit other, double share) {
-  if (share * ReachedFrom(limit) > reached_share * ReachedFrom(other)) {
+  if (share > reached_share) {
     limit = other;
     reached_share = share;
   }
@@ -18,56 +14,57 @@ void FeedMoment::Offer(FeedLimit other, double share) {
 namespace {
 
 FeedLimit LabelOf(const FeedMoment& m) {
-  return m.reached_share >= ReachedFrom(m.limit) ? m.limit : FeedLimit::kSmoothing;
+  return m.reached_share >= kLimitReached ? m.limit : FeedLimit::kSmoothing;
 }
 
 }  // namespace
 
 void BindingReport::Close(double s_mm) {
-  const std::vector<Span> spans = WithoutGaps(Spans());
-  for (const Span& span : spans) {
+  for (const Span& span : Spans()) {
     Tell(span, span.end < moments_.size() ? moments_[span.end].s_mm : s_mm);
   }
   moments_.clear();
 }
 
-// By limit reached; one span for all that reaches none.
+// The limit that a moment reaches, or else the one reached next before or after it that the smoothing ties it to.
+std::vector<FeedLimit> BindingReport::Labels() const {
+  const std::size_t count = moments_.size();
+  std::vector<FeedLimit> labels;
+  std::vector<std::size_t> after(count);  // moments until the next that reaches one
+  std::size_t away = reach_moments_ + 1;
+  for (std::size_t k = count; k-- > 0;) {
+    away = LabelOf(moments_[k]) != FeedLimit::kSmoothing ? 0 : away + 1;
+    after[k] = away;
+  }
+  std::size_t before = reach_moments_ + 1;
+  for (std::size_t k = 0; k < count; ++k) {
+    before = after[k] == 0 ? 0 : before + 1;
+    const std::size_t nearest = std::min(before, after[k]);
+    const std::size_t source = nearest == before ? k - nearest : k + nearest;
+    labels.push_back(nearest <= reach_moments_ ? LabelOf(moments_[source]) : FeedLimit::kSmoothing);
+  }
+  return labels;
+}
+
 std::vector<BindingReport::Span> BindingReport::Spans() const {
+  const std::vector<FeedLimit> labels = Labels();
   std::vector<Span> spans;
-  for (std::size_t k = 0; k < moments_.size(); ++k) {
-    const FeedLimit label = LabelOf(moments_[k]);
-    if (spans.empty() || spans.back().limit != label) {
-      spans.push_back({k, k, label, label});
+  for (std::size_t k = 0; k < labels.size();) {
+    std::size_t end = k;
+    while (end < labels.size() && labels[end] == labels[k]) {
+      ++end;
     }
-    spans.back().end = k + 1;
+    if (labels[k] == FeedLimit::kSmoothing) {
+      Unreached(k, end, spans);
+    } else {
+      spans.push_back({k, end, labels[k], labels[k]});
+    }
+    k = end;
   }
   return spans;
 }
 
-std::vector<BindingReport::Span> BindingReport::WithoutGaps(const std::vector<Span>& spans) const {
-  std::vector<Span> kept;
-  std::size_t begin = 0;  // of the next span, which may take over a part of the gap before it
-  for (std::size_t i = 0; i < spans.size(); ++i) {
-    const bool last = i + 1 == spans.size();
-    if (spans[i].limit != FeedLimit::kSmoothing) {
-      if (!kept.empty() && kept.back().limit == spans[i].limit) {
-        kept.back().end = spans[i].end;
-      } else {
-        kept.push_back({begin, spans[i].end, spans[i].limit, spans[i].limit});
-      }
-      begin = spans[i].end;
-    } else if (spans[i].end - spans[i].begin > change_moments_ || spans.size() == 1) {
-      Unreached(spans[i].begin, spans[i].end, kept);
-      begin = spans[i].end;
-    } else if (!kept.empty()) {
-      begin = last ? spans[i].end : (spans[i].begin + spans[i].end) / 2;
-      kept.back().end = begin;
-    }
-  }
-  return kept;
-}
-
-// By the limit that is nearest, each for at least the time of a change.
+// By the limit that is nearest, each for at least as long as the smoothing reaches.
 void BindingReport::Unreached(std::size_t begin, std::size_t end, std::vector<Span>& spans) const {
   const std::size_t first = spans.size();
   for (std::size_t k = begin; k < end;) {
@@ -76,7 +73,7 @@ void BindingReport::Unreached(std::size_t begin, std::size_t end, std::vector<Sp
       ++same;
     }
     const bool joins =
-        spans.size() > first && (same - k <= change_moments_ || spans.back().nearest == moments_[k].limit);
+        spans.size() > first && (same - k <= reach_moments_ || spans.back().nearest == moments_[k].limit);
     if (joins) {
       spans.back().end = same;
     } else {

@@ -1,11 +1,11 @@
 // Names the limit that binds, stretch by stretch, where the programmed feed is not held, from what the final plan does.
 //
 // Model: moments a fixed time apart, each with the limit that is nearest to being reached and its share of that limit. A
-// limit is reached from 0.991 of it on, so that whoever measures elsewhere finds 0.99; a contour tolerance from 0.95, because
-// plans are held to 0.97 of it between the places where it is measured. Moments that reach the same limit, one after the
-// other, are a stretch. Between two limits the smoothing needs a while to change the jerk; so much of what reaches none is
-// shared between the stretches before and behind. What reaches none for longer is SMOOTHING, and names the limit that it
-// stays below, and by how much; where another one is the nearest for as long, another stretch begins.
+// limit is reached from 0.9 of it on, and its share is told: plans keep a little below their limits, a contour tolerance to
+// 0.97, and a place that is slowed as much as the one next to it needs keeps a little more. The smoothing in time ties every moment to those
+// within half its width: whoever drives faster here reaches the limit there. So a moment that reaches none is bound by the
+// one reached next to it in time, as far as the smoothing ties. What is tied to none is SMOOTHING, and names the limit that
+// it stays below, and by how much; where another one is the nearest for as long, another stretch begins.
 // Units: mm, s. Threads: a value. Cost: linear; moments of one unbroken slow place are kept.
 #pragma once
 
@@ -31,14 +31,14 @@ struct FeedMoment {
 // The feed counts as held from this share on.
 inline constexpr double kFeedHeld = 0.99;
 
-// From here on a limit counts as reached.
-double ReachedFrom(FeedLimit limit);
+// A limit counts as reached from this share of it on; how much of it is used is told with it.
+inline constexpr double kLimitReached = 0.9;
 
 class BindingReport {
  public:
-  // `change_moments`: what the smoothing needs to go from one limit to another.
-  BindingReport(std::size_t change_moments, std::vector<SlowStretch>& slow)
-      : change_moments_(change_moments), slow_(slow) {}
+  // `reach_moments`: half the smoothing's width.
+  BindingReport(std::size_t reach_moments, std::vector<SlowStretch>& slow)
+      : reach_moments_(reach_moments), slow_(slow) {}
 
   void Take(const FeedMoment& moment) { moments_.push_back(moment); }
   // The feed is held from here on, or its run ends.
@@ -51,12 +51,12 @@ class BindingReport {
     FeedLimit nearest = FeedLimit::kFeed;
   };
 
+  std::vector<FeedLimit> Labels() const;
   std::vector<Span> Spans() const;
-  std::vector<Span> WithoutGaps(const std::vector<Span>& spans) const;
   void Unreached(std::size_t begin, std::size_t end, std::vector<Span>& spans) const;
   void Tell(const Span& span, double end_s_mm);
 
-  std::size_t change_moments_;
+  std::size_t reach_moments_;
   std::vector<SlowStretch>& slow_;
   std::vector<FeedMoment> moments_;
 };

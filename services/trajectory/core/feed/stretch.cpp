@@ -837,9 +837,8 @@ class StretchPlanner {
 
   // Moments a check apart: what slows the cut where it is slow, on the final polynomials.
   void ReportBinding() {
-    const double change_s = model_.filter.second_s + model_.filter.third_s + 6 * knot_;
     const double apart_s = knot_ * model_.options.knots_per_segment / kContourChecks;
-    BindingReport report(static_cast<std::size_t>(change_s / apart_s), plan_.slow);
+    BindingReport report(static_cast<std::size_t>(model_.filter.half_support_s() / apart_s), plan_.slow);
     run_at_ = piece_at_ = node_at_ = corner_at_ = 0;
     bool open = false;
     for (std::size_t n = 0; n < segment_count_; ++n) {
