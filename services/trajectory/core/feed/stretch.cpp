@@ -15,7 +15,7 @@ namespace {
 using Eigen::Vector2d;
 
 constexpr double kPathMargin = 0.995;  // planned against the limit, before smoothing
-constexpr double kActuatorMargin = 0.97;
+constexpr double kActuatorMargin = 0.99;
 constexpr int kMostPasses = 80;
 constexpr std::size_t kAskEvery = 4096;  // segments between questions whether planning is still wanted
 constexpr int kChecksPerSegment = 16;
