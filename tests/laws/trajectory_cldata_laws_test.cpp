@@ -1,7 +1,9 @@
 // CLDATA in and out: writing what was read changes nothing, and a program in G-code makes the same motions as its CLDATA.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <cstdlib>
 #include <fstream>
 #include <numbers>
@@ -194,6 +196,177 @@ TEST(CldataLaw, RandomToolAxesComeBack) {
     ASSERT_EQ(WriteCldata(read.operations, "axes").text,
               text.text.substr(0, text.text.size() - 5) + "END\nFINI\n");
   }
+}
+
+// ---- drilling cycles ----
+
+double Apart(const Operation& a, const Operation& b) {
+  return std::hypot(a.x_W_mm - b.x_W_mm, a.y_W_mm - b.y_W_mm, a.z_W_mm - b.z_W_mm);
+}
+
+bool SameTool(const Operation& a, const Operation& b) {
+  return std::abs(a.a_rad - b.a_rad) + std::abs(a.b_rad - b.b_rad) < 1e-9;
+}
+
+// What moves, dwells and switches, without moves of no length and with traverses on one line as one.
+std::vector<Operation> Motions(const std::vector<Operation>& operations) {
+  std::vector<Operation> list;
+  for (const Operation& o : operations) {
+    if (!Compared(o) ||
+        (Moves(o) && !list.empty() && Apart(list.back(), o) < 1e-9 && SameTool(list.back(), o))) {
+      continue;
+    }
+    if (!Moves(o) && !list.empty()) {  // stands where the motion before has ended
+      const Operation ended = list.back();
+      list.push_back(ended);
+      list.back().kind = o.kind;
+      list.back().value = o.value;
+      continue;
+    }
+    const std::size_t n = list.size();
+    const bool on =
+        n > 1 && o.kind == OperationKind::kTraverse && list[n - 1].kind == o.kind &&
+        SameTool(list[n - 2], o) && SameTool(list[n - 1], o) &&
+        std::abs(Apart(list[n - 2], list[n - 1]) + Apart(list[n - 1], o) - Apart(list[n - 2], o)) < 1e-9;
+    if (on) {
+      list.back() = o;
+    } else {
+      list.push_back(o);
+    }
+  }
+  return list;
+}
+
+std::string Words(const char* format, double a, double b, double c = 0.0, double d = 0.0, double e = 0.0,
+                  double f = 0.0) {
+  char text[200];
+  std::snprintf(text, sizeof text, format, a, b, c, d, e, f);
+  return text;
+}
+
+// Groups of holes with one tilt each, in one go, with a dwell, in steps; back to the level before or to R between them.
+struct Twins {
+  std::string gcode = "G21 G90\nF300\n";
+  std::string cldata = "PARTNO/'T'\nMULTAX/ON\nFEDRAT/300,MMPM\n";
+
+  void Group(Draw& draw) {
+    const HeadAngles tilt{draw.Of(2) * draw.In(-0.4, 0.4), draw.Of(2) * draw.In(-0.4, 0.4)};
+    const ToolAxis axis = AxisOf(ToolAngles::kRollPitch, tilt);
+    const double way = draw.In(20, 30), level = way * axis[2], r = draw.In(1, 4), depth = draw.In(2, 15);
+    const double x = draw.In(-50, 50), y = draw.In(-50, 50), feed = draw.In(20, 400);
+    const bool to_r = draw.Of(2) == 0;
+    const int kind = draw.Of(3);
+    const double extra = kind == 1 ? draw.In(0.1, 1.0) : draw.In(1, 5);
+    gcode += Words("G0 X%.12f Y%.12f Z%.12f A%.12f B%.12f\n", x + way * axis[0], y + way * axis[1],
+                   way * axis[2], tilt.a_rad * 180 / kPi, tilt.b_rad * 180 / kPi);
+    gcode += Words("G8%.0f G%.0f X%.12f Y%.12f", kind + 1, to_r ? 99 : 98, x, y);
+    gcode += Words(" Z%.12f R%.12f", -depth, r);
+    gcode += kind == 0 ? "" : Words(kind == 1 ? " P%.12f" : " Q%.12f", extra, 0.0);
+    gcode += Words(" F%.12f\n", feed, 0.0);
+    cldata += "RAPID\n" + Goto(x + way * axis[0], y + way * axis[1], way * axis[2], axis);
+    cldata +=
+        kind == 2 ? draw.Of(2) == 0 ? "CYCLE/DEEP,DEPTH," : "CYCLE/DRILL,PECK,DEPTH," : "CYCLE/DRILL,DEPTH,";
+    cldata += Words("%.12f,MMPM,%.12f,", depth, feed);
+    cldata += to_r              ? Words("CLEAR,%.12f", r, 0.0)
+              : draw.Of(2) == 0 ? Words("CLEAR,%.12f,RAPTO,%.12f", level, level - r)
+                                : Words("RAPTO,%.12f,RTRCTO,%.12f", r, level);
+    cldata += kind == 0 ? "\n" : Words(kind == 1 ? ",DWELL,%.12f\n" : ",STEP,%.12f\n", extra, 0.0);
+    cldata += Goto(x, y, 0, axis);
+    for (int more = draw.Of(3); more > 0; --more) {
+      const double to_x = draw.In(-50, 50), to_y = draw.In(-50, 50);
+      gcode += Words("X%.12f Y%.12f\n", to_x, to_y);
+      cldata += Goto(to_x, to_y, 0, axis);
+    }
+    gcode += "G80\n";
+    cldata += "CYCLE/OFF\n";
+  }
+
+  static std::string Goto(double x, double y, double z, const ToolAxis& axis) {
+    return Words("GOTO/%.12f,%.12f,%.12f,%.15f,%.15f,%.15f\n", x, y, z, axis[0], axis[1], axis[2]);
+  }
+};
+
+TEST(CldataLaw, CyclesDrillAsThoseOfGcodeDo) {
+  int holes = 0;
+  for (unsigned seed = 1; seed <= 200; ++seed) {
+    SCOPED_TRACE(seed);
+    Draw draw(seed);
+    Twins twins;
+    for (int group = 0; group < 5; ++group) {
+      twins.Group(draw);
+    }
+    ReadOptions options;
+    options.gcode.axes = options.cldata.axes = kSixAxes;
+    options.cldata.tool_angles = ToolAngles::kRollPitch;
+    const PartProgram gcode = ReadPartProgram(twins.gcode + "M2\n", options);
+    const PartProgram cldata = ReadPartProgram(twins.cldata + "FINI\n", options);
+    ASSERT_TRUE(gcode.faults.empty()) << gcode.faults[0].line << gcode.faults[0].message << twins.gcode;
+    ASSERT_TRUE(cldata.faults.empty()) << cldata.faults[0].line << cldata.faults[0].message << twins.cldata;
+    ExpectSame(Motions(gcode.operations), Motions(cldata.operations), 1e-8);
+    if (HasFatalFailure()) {
+      FAIL() << twins.gcode << twins.cldata;
+    }
+    const CldataText once = WriteCldata(cldata.operations, "t", {}, ToolAngles::kRollPitch);
+    ASSERT_TRUE(once.faults.empty());
+    const PartProgram again = ReadPartProgram(once.text, options);
+    ASSERT_TRUE(again.faults.empty()) << again.faults[0].message;
+    ExpectSame(cldata.operations, again.operations, 1e-9);
+    EXPECT_EQ(WriteCldata(again.operations, "t", {}, ToolAngles::kRollPitch).text, once.text);
+    holes += static_cast<int>(std::count(twins.cldata.begin(), twins.cldata.end(), 'G'));
+  }
+  EXPECT_GT(holes, 1000);
+}
+
+// One hole as Creo, Fusion and NX write it; and what stands below its height rises along the tool before it goes aside.
+TEST(CldataLaw, CyclesOfDifferentPostsAreTheSameHole) {
+  const auto heights = [](const std::string& cycle) {
+    const PartProgram read =
+        ReadCldata("UNITS/MM\nFEDRAT/100,MMPM\nRAPID\nGOTO/0,0,1\n" + cycle + "\nGOTO/7,0,-2\nFINI\n",
+                   {.axes = kSixAxes});
+    EXPECT_TRUE(read.faults.empty()) << cycle << read.faults[0].message;
+    std::string text;
+    for (const Operation& o : read.operations) {
+      if (Moves(o)) {
+        text += Words(o.kind == OperationKind::kTraverse ? "r%g:%g " : "f%g:%g ", o.x_W_mm, o.z_W_mm);
+      }
+    }
+    return text;
+  };
+  const std::string one = "r0:1 r0:8 r7:8 r7:1 f7:-11 r7:8 ";
+  EXPECT_EQ(heights("CYCLE/DRILL,DEPTH,9,MMPM,50,CLEAR,10,RAPTO,7"), one);
+  EXPECT_EQ(heights("CYCLE / DRILL, 9.0, MMPM, 50.0, 10.0, RAPTO, 7.0"), one);
+  EXPECT_EQ(heights("CYCLE/DRILL,RAPTO,3,FEDTO,-9,RTRCTO,10,MMPM,50"), one);
+  EXPECT_EQ(heights("CYCLE/FACE,DEPTH,9,CLEAR,3,RETURN,10"), one);
+  EXPECT_EQ(heights("CYCLE/DRILL,BRKCHP,DEPTH,9,STEP,7,CLEAR,3"), "r0:1 r7:1 f7:-6 r7:-5.746 f7:-11 r7:1 ");
+}
+
+TEST(CldataLaw, SpindleAndCoolantAreThoseOfMachinesWithZ) {
+  const PartProgram read = ReadCldata(
+      "UNITS/MM\nSPINDL/1500,RPM,CLW\nCOOLNT/FLOOD\nRAPID\nGOTO/0,0,9\nSPINDL/RANGE,2,2000,RPM,CCLW\nSPINDL/"
+      "ON\n"
+      "AUXFUN/3\nFEDRAT/0.1,MMPR\nGOTO/0,0,0\nSPINDL/OFF\nAUXFUN/5\nAUXFUN/4\nFINI\n",
+      {.axes = kSixAxes});
+  ASSERT_TRUE(read.faults.empty()) << read.faults[0].message;
+  std::string text;
+  for (const Operation& o : read.operations) {
+    text += FormatOperation(o).substr(0, FormatOperation(o).find(" x_mm")) + "\n";
+  }
+  EXPECT_EQ(text,
+            "1 UNITS_CHANGE unit_mm=1\n2 SPINDLE_ON speed_per_min=1500\n3 COOLANT_ON\n5 TRAVERSE\n"
+            "6 SPINDLE_ON speed_per_min=-2000\n8 SPINDLE_ON speed_per_min=2000\n9 FEED_CHANGE "
+            "feed_mm_per_s=3.33333333\n"
+            "10 FEED_LINE\n11 SPINDLE_OFF\n13 SPINDLE_ON speed_per_min=-2000\n14 SPINDLE_OFF\n14 "
+            "COOLANT_OFF\n14 END\n");
+  const CldataText once = WriteCldata(read.operations, "s");
+  ASSERT_TRUE(once.faults.empty());
+  const PartProgram again = ReadCldata(once.text, {.axes = kSixAxes});
+  ASSERT_TRUE(again.faults.empty()) << again.faults[0].message;
+  EXPECT_EQ(WriteCldata(again.operations, "s").text, once.text);
+  CldataOptions slow{.axes = kSixAxes};
+  slow.spindle = {100, 1800};
+  EXPECT_EQ(ReadCldata("SPINDL/1900,RPM\nFINI\n", slow).faults.at(0).reason, "SPINDLE_SPEED_OUT_OF_RANGE");
+  slow.spindle.most_per_min = 0.0;
+  EXPECT_EQ(ReadCldata("SPINDL/1900,RPM\nFINI\n", slow).faults.at(0).reason, "SPINDLE_MISSING");
 }
 
 TEST(CldataLaw, WhatCldataCannotSayIsNamed) {

@@ -38,6 +38,9 @@ inline HexapodMotion WorkedMotion() {
   m.corner_tolerance_mm = 0.02;
   m.corner_tolerance_rad = 2e-4;
   m.X_MT_zero.p_mm = {0, 0, 980};
+  m.spindle_least_per_min = 500;
+  m.spindle_most_per_min = 12000;
+  m.spindle_run_up_s = 1.5;
   return m;
 }
 

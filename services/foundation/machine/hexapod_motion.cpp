@@ -4,6 +4,11 @@
 #include <cmath>
 
 namespace lambdajet {
+namespace {
+
+constexpr double kLongestRunUp_s = 600.0;
+
+}  // namespace
 
 std::string_view FaultOf(const HexapodMotion& m) {
   const std::array<double, 9> positive = {m.strut_velocity_mm_per_s, m.strut_acceleration_mm_per_s2,
@@ -18,6 +23,11 @@ std::string_view FaultOf(const HexapodMotion& m) {
   }
   if (!m.X_MT_zero.p_mm.allFinite() || !m.X_MT_zero.R.allFinite()) {
     return "the program zero must be a pose of finite numbers";
+  }
+  const double least = m.spindle_least_per_min, most = m.spindle_most_per_min;
+  if (!(least >= 0.0 && least <= most && std::isfinite(most) && m.spindle_run_up_s >= 0.0 &&
+        m.spindle_run_up_s <= kLongestRunUp_s)) {
+    return "a spindle's speeds must be finite, the least not above the most, and its run-up 0 to 600 s";
   }
   return {};
 }

@@ -23,6 +23,9 @@ struct HexapodMotion {
   double corner_tolerance_mm = 0.01;   // of the tip, before a program's first G64 P
   double corner_tolerance_rad = 1e-4;  // of the tool's direction and turn
   Pose X_MT_zero;
+  double spindle_least_per_min = 0.0;
+  double spindle_most_per_min = 0.0;  // 0: no spindle
+  double spindle_run_up_s = 0.0;      // from rest to the fastest; a change of speed takes its share of it
 };
 
 // What is wrong, first fault only; empty if nothing is.

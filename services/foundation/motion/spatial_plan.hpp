@@ -27,6 +27,24 @@ struct SpatialSegment {
   std::uint32_t gate_at_end = 0;  // id of the gate that closes at this segment's end; 0: none
 };
 
+enum class SpatialAction : std::uint8_t {
+  kSpindle,  // argument: turns a minute, clockwise positive; 0 stops it
+  kCoolantOn,
+  kCoolantOff,
+  kCameraTrackOn,  // argument: id of the mark
+  kCameraTrackOff
+};
+
+// Something beside the struts that happens when the path length reaches s_mm. A spindle's way to its speed is waited for at
+// the dwell that stands there.
+struct SpatialProcessEvent {
+  std::uint32_t index = 0;  // 0, 1, … in path order
+  SpatialAction action = SpatialAction::kSpindle;
+  double s_mm = 0.0;
+  double argument = 0.0;
+  std::uint32_t source_line = 0;
+};
+
 struct SpatialPlan {
   std::uint64_t id = 0;  // hash of program, options and machine: the same inputs, the same plan
   std::string machine_id;
@@ -35,7 +53,7 @@ struct SpatialPlan {
   double length_mm = 0.0;
   std::vector<SpatialSegment> segments;
   std::vector<Gate> gates;
-  std::vector<ProcessEvent> events;
+  std::vector<SpatialProcessEvent> events;
 };
 
 }  // namespace lambdajet

@@ -58,6 +58,11 @@ constexpr std::array<MotionKey, 9> kMotionKeys = {
      {"corner_tolerance_mm", &HexapodMotion::corner_tolerance_mm},
      {"corner_tolerance_rad", &HexapodMotion::corner_tolerance_rad}}};
 
+// Of a machine that has one.
+constexpr std::array<MotionKey, 3> kSpindleKeys = {{{"least_per_min", &HexapodMotion::spindle_least_per_min},
+                                                    {"most_per_min", &HexapodMotion::spindle_most_per_min},
+                                                    {"run_up_s", &HexapodMotion::spindle_run_up_s}}};
+
 Pose ReadPose(MapReader& file, const std::string& key, Findings& findings) {
   MapReader reader(file.Child(key), key + ".", findings);
   const Eigen::Vector3d p(reader.Number("x_mm"), reader.Number("y_mm"), reader.Number("z_mm"));
@@ -124,6 +129,12 @@ HexapodMachine ReadHexapod(const YAML::Node& root, Findings& findings) {
     machine.motion.*key.member = motion.Number(key.name);
   }
   machine.motion.X_MT_zero = ReadPose(file, "program_zero", findings);
+  if (file.Has("spindle")) {
+    MapReader spindle(file.Child("spindle"), "spindle.", findings);
+    for (const MotionKey& key : kSpindleKeys) {
+      machine.motion.*key.member = spindle.Number(key.name);
+    }
+  }
   return machine;
 }
 
@@ -193,7 +204,14 @@ std::string HexapodText(const HexapodMachine& machine) {
   for (const MotionKey& key : kMotionKeys) {
     text += std::string("  ") + key.name + ": " + ShortestText(machine.motion.*key.member) + "\n";
   }
-  return text + PoseText("program_zero", machine.motion.X_MT_zero);
+  text += PoseText("program_zero", machine.motion.X_MT_zero);
+  if (machine.motion.spindle_most_per_min > 0.0) {
+    text += "spindle:\n";
+    for (const MotionKey& key : kSpindleKeys) {
+      text += std::string("  ") + key.name + ": " + ShortestText(machine.motion.*key.member) + "\n";
+    }
+  }
+  return text;
 }
 
 std::string HexapodHash(const HexapodMachine& machine) { return ContentHash(HexapodText(machine)); }

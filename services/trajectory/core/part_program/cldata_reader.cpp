@@ -7,6 +7,7 @@
 #include <numbers>
 #include <optional>
 
+#include "trajectory/core/part_program/cldata_cycle.hpp"
 #include "trajectory/core/part_program/cldata_words.hpp"
 
 namespace lambdajet::trajectory {
@@ -19,6 +20,9 @@ constexpr double kInchMm = 25.4;
 constexpr double kAxisTolerance = 1e-6;    // of a unit vector's components
 constexpr double kVectorTolerance = 1e-3;  // of a tool axis' length
 constexpr double kAngleTolerance_rad = 1e-3;
+constexpr double kNoRise_mm = 1e-9;
+constexpr double kLeastRise =
+    0.5;  // cosine between two tools' axes up to which one rises over the other's hole
 
 enum class Major : std::uint8_t {
   kText,  // says nothing about motion
@@ -33,6 +37,7 @@ enum class Major : std::uint8_t {
   kCutter,
   kToolCompensation,
   kMultax,
+  kCycle,
   kSpindle,
   kAuxiliary,
   kCoolant,
@@ -49,7 +54,7 @@ struct MajorWord {
   Major major;
 };
 
-constexpr std::array<MajorWord, 37> kMajors = {{
+constexpr std::array<MajorWord, 38> kMajors = {{
     {"PARTNO", Major::kText},
     {"PPRINT", Major::kText},
     {"REMARK", Major::kText},
@@ -73,6 +78,7 @@ constexpr std::array<MajorWord, 37> kMajors = {{
     {"TLCOMP", Major::kToolCompensation},
     {"CUTCOM", Major::kToolCompensation},
     {"MULTAX", Major::kMultax},
+    {"CYCLE", Major::kCycle},
     {"SPINDL", Major::kSpindle},
     {"AUXFUN", Major::kAuxiliary},
     {"COOLNT", Major::kCoolant},
@@ -97,9 +103,8 @@ const MajorWord* Find(std::string_view word) {
 
 // Words a post may well write that this reader refuses, with what to do instead.
 std::string AdviceOn(std::string_view word) {
-  if (word == "CYCLE" || word == "GOHOME" || word == "INSERT" || word == "ORIGIN" || word == "TRACUT" ||
-      word == "ROTABL" || word == "ROTHED" || word == "ROTATE" || word == "TRANS" || word == "MSYS" ||
-      word == "TLAXIS") {
+  if (word == "GOHOME" || word == "INSERT" || word == "ORIGIN" || word == "TRACUT" || word == "ROTABL" ||
+      word == "ROTHED" || word == "ROTATE" || word == "TRANS" || word == "MSYS" || word == "TLAXIS") {
     return "have the post write the motions themselves, as GOTO in the part's coordinates";
   }
   if (word == "TLON" || word == "INDIRV" || word == "INDIRP" || word == "AUTOPS" || word == "GOFWD") {
@@ -184,7 +189,17 @@ class Reader {
         word->major != Major::kText) {
       return Fault(statement_.place, "RAPID_WITHOUT_MOTION", "RAPID belongs to the GOTO that follows it");
     }
+    if (drills_ && MovesWithoutHole(word->major)) {
+      return Fault(
+          statement_.place, "CYCLE_STILL_ON",
+          "CYCLE/OFF must stand before a motion that drills nothing; under a cycle every GOTO is a hole");
+    }
     return Obey(word->major);
+  }
+
+  static bool MovesWithoutHole(Major major) {
+    return major == Major::kRapid || major == Major::kGodelta || major == Major::kFrom ||
+           major == Major::kCircle || major == Major::kMoveArc;
   }
 
   bool Obey(Major major) {
@@ -220,6 +235,8 @@ class Reader {
 
   bool ObeySwitch(Major major) {
     switch (major) {
+      case Major::kCycle:
+        return Cycle();
       case Major::kSpindle:
         return Spindle();
       case Major::kAuxiliary:
@@ -279,31 +296,19 @@ class Reader {
   }
 
   bool FeedIn(const CldataParameter& unit, double f) {
-    const std::string& u = unit.word;
-    if (u == "MMPM" || u == "IPM" || u == "PERMIN" || u == "UPM") {
-      return SetFeed(f * (u == "MMPM" ? 1.0 : u == "IPM" ? kInchMm : unit_mm_) / kSecondsPerMinute);
-    }
-    if (u == "MMPS" || u == "IPS") {
-      return SetFeed(f * (u == "MMPS" ? 1.0 : kInchMm));
-    }
-    if (u == "MMPR" || u == "IPR" || u == "PERREV") {
-      if (!(spindle_per_min_ > 0.0)) {
-        return Fault(
-            unit.place, "FEED_NEEDS_SPINDLE_SPEED",
-            "feed a revolution needs SPINDL with revolutions a minute before it; a jet has none: use MMPM");
-      }
-      return SetFeed(f *
-                     (u == "MMPR"  ? 1.0
-                      : u == "IPR" ? kInchMm
-                                   : unit_mm_) *
-                     spindle_per_min_ / kSecondsPerMinute);
-    }
-    if (u == "INVERS") {
+    if (unit.word == "INVERS") {
       move_s_ = kSecondsPerMinute / f;
       return true;
     }
-    return Fault(unit.place, "FEED_UNIT_UNKNOWN",
-                 "MMPM, IPM, MMPS, PERMIN, MMPR, IPR, PERREV and INVERS are known");
+    if (!IsFeedUnit(unit.word)) {
+      return Fault(unit.place, "FEED_UNIT_UNKNOWN",
+                   "MMPM, IPM, MMPS, PERMIN, MMPR, IPR, PERREV and INVERS are known");
+    }
+    CldataFault fault;
+    double feed_mm_per_s = 0.0;
+    return lambdajet::trajectory::FeedIn(unit, f, {unit_mm_, spindle_per_min_}, feed_mm_per_s, fault)
+               ? SetFeed(feed_mm_per_s)
+               : Fault(fault.place, fault.reason, fault.message);
   }
 
   bool SetFeed(double feed_mm_per_s) {
@@ -394,29 +399,76 @@ class Reader {
 
   // ---- switches ----
 
-  // With or without revolutions, which a jet does not have and a wheel's program needs for feeds a revolution.
+  // A jet has no revolutions, but a wheel's program needs them for feeds a revolution.
   bool Spindle() {
     if (!Count(1, 8)) {
       return false;
     }
     bool off = false;
+    double sense = spindle_sense_;
+    const CldataParameter* speed = nullptr;
     for (std::size_t i = 0; i < Size(); ++i) {
       const CldataParameter& p = At(i);
-      off = off || p.word == "OFF";
-      if (p.is_number && !(p.value > 0.0)) {
-        return Fault(p.place, "SPINDLE_SPEED_NOT_POSITIVE",
-                     "a spindle's speed is above 0; SPINDL/OFF stops it");
-      }
-      if (p.is_number) {
-        spindle_per_min_ = p.value;
-      }
       static constexpr std::array<std::string_view, 8> kWords = {"ON",  "OFF", "RPM",  "SFM",
                                                                  "SMM", "CLW", "CCLW", "RANGE"};
       if (!p.is_number && std::find(kWords.begin(), kWords.end(), p.word) == kWords.end()) {
         return Fault(p.place, "SPINDLE_WORD_UNKNOWN", "ON, OFF, RPM, CLW and CCLW are known");
       }
+      if (HasSpindle() && (p.word == "SFM" || p.word == "SMM")) {
+        return Fault(p.place, "SPINDLE_UNIT_UNKNOWN", "a spindle's speed is in turns a minute, RPM");
+      }
+      off = off || p.word == "OFF";
+      sense = p.word == "CLW" ? 1.0 : p.word == "CCLW" ? -1.0 : sense;
+      const bool of_range = i > 0 && At(i - 1).word == "RANGE";
+      speed = p.is_number && !of_range ? &p : speed;
     }
-    return off ? JetOff() : Pierce(0.0);
+    if (speed != nullptr && !SetSpindleSpeed(*speed)) {
+      return false;
+    }
+    return HasSpindle() ? Turn(off, sense) : off ? JetOff() : Pierce(0.0);
+  }
+
+  bool SetSpindleSpeed(const CldataParameter& p) {
+    if (!(p.value > 0.0)) {
+      return Fault(p.place, "SPINDLE_SPEED_NOT_POSITIVE",
+                   "a spindle's speed is above 0; SPINDL/OFF stops it");
+    }
+    const SpindleRange& range = options_.spindle;
+    if (HasSpindle() && range.most_per_min > 0.0 &&
+        !(p.value >= range.least_per_min && p.value <= range.most_per_min)) {
+      return Fault(p.place, "SPINDLE_SPEED_OUT_OF_RANGE",
+                   "this spindle turns " + Number(range.least_per_min) + " to " + Number(range.most_per_min) +
+                       " times a minute");
+    }
+    spindle_per_min_ = p.value;
+    return true;
+  }
+
+  bool HasSpindle() const { return Has(kAxisZ); }
+
+  bool Turn(bool off, double sense) {
+    if (off) {
+      if (spindle_turns_) {
+        Add(OperationKind::kSpindleOff);
+      }
+      spindle_turns_ = false;
+      return true;
+    }
+    if (!(options_.spindle.most_per_min > 0.0)) {
+      return Fault(statement_.place, "SPINDLE_MISSING", "this machine has no spindle");
+    }
+    if (!(spindle_per_min_ > 0.0)) {
+      return Fault(statement_.place, "SPINDLE_SPEED_MISSING",
+                   "SPINDL must say the speed first, as in SPINDL/3000,RPM,CLW");
+    }
+    const double turns = sense * spindle_per_min_;
+    if (!spindle_turns_ || turns != turns_per_min_) {
+      Add(OperationKind::kSpindleOn)->value = turns;
+    }
+    spindle_turns_ = true;
+    spindle_sense_ = sense;
+    turns_per_min_ = turns;
+    return true;
   }
 
   bool Pierce(double time_s) {
@@ -438,9 +490,12 @@ class Reader {
     return true;
   }
 
+  // On a machine with a spindle the same words mean its coolant.
   bool Abrasive(bool on) {
     if (on != abrasive_on_) {
-      Add(on ? OperationKind::kAbrasiveOn : OperationKind::kAbrasiveOff);
+      Add(HasSpindle() ? on ? OperationKind::kCoolantOn : OperationKind::kCoolantOff
+          : on         ? OperationKind::kAbrasiveOn
+                       : OperationKind::kAbrasiveOff);
       abrasive_on_ = on;
     }
     return true;
@@ -487,7 +542,7 @@ class Reader {
       return Fault(At(0).place, "UNKNOWN_M_CODE",
                    "not a word of this machine; see the table of supported words");
     }
-    const bool takes = m == 3 || m == 4 || m == 62 || m == 63 || m == 100 || m == 101;
+    const bool takes = (!HasSpindle() && (m == 3 || m == 4)) || m == 62 || m == 63 || m == 100 || m == 101;
     if (p != nullptr && !takes) {
       return Fault(At(1).place, "WORD_WITHOUT_USE", "this M word takes no number");
     }
@@ -495,6 +550,9 @@ class Reader {
   }
 
   bool Machine(double m, const double* p) {
+    if (HasSpindle() && m >= 3 && m <= 5) {
+      return Turn(m == 5, m == 4 ? -1.0 : 1.0);
+    }
     if (m == 3 || m == 4) {
       return (p == nullptr || (*p > 0.0 && *p <= 600.0))
                  ? Pierce(p != nullptr ? *p : 0.0)
@@ -511,6 +569,10 @@ class Reader {
   }
 
   bool Output(bool on, const double* p) {
+    if (HasSpindle()) {
+      return Fault(At(0).place, "OUTPUT_UNKNOWN",
+                   "this machine has no jet; SPINDL and COOLNT switch what it has");
+    }
     if (p == nullptr || (*p != 0.0 && *p != 1.0)) {
       return Fault(At(0).place, "OUTPUT_UNKNOWN", "AUXFUN/62,0 is the jet, AUXFUN/62,1 the abrasive");
     }
@@ -545,6 +607,10 @@ class Reader {
     if (jet_on_) {
       JetOff();
     }
+    if (HasSpindle()) {
+      Turn(true, 0.0);
+      Abrasive(false);
+    }
     Add(OperationKind::kEnd);
     ended_ = true;
     return true;
@@ -568,6 +634,9 @@ class Reader {
     Vector target;
     if (!Target(target)) {
       return false;
+    }
+    if (drills_) {
+      return Drill(target);
     }
     if (rapid_) {
       return Traverse(target);
@@ -599,7 +668,7 @@ class Reader {
       }
       target[i] += p.value * unit_mm_ * (Size() == 1 ? axis_[i] : 1.0);
     }
-    if (!Driven(target)) {
+    if (!CoordinatesFit(target) || !Driven(target)) {
       return false;
     }
     return rapid_ ? Traverse(target) : Line(target);
@@ -694,6 +763,116 @@ class Reader {
           "part programs of this machine move X and Y only; Z was " + Number(position_[2]) + " mm before");
     }
     return true;
+  }
+
+  // ---- holes ----
+
+  bool Cycle() {
+    const bool on = Size() == 1 && At(0).word == "ON";
+    if (on || (Size() == 1 && At(0).word == "OFF")) {
+      drills_ = on;
+      return !on || cycle_ ||
+             Fault(statement_.place, "CYCLE_UNKNOWN",
+                   "CYCLE/ON goes on with a cycle, and none stands before");
+    }
+    drills_ = false;
+    if (!Has(kAxisZ)) {
+      return Fault(statement_.place, "CYCLE_AXIS_NOT_DRIVEN", "drilling cycles need a machine that moves Z");
+    }
+    CldataCycle cycle;
+    CldataFault fault;
+    if (!ReadCycle(statement_, {unit_mm_, spindle_per_min_}, cycle, fault)) {
+      return Fault(fault.place, fault.reason, fault.message);
+    }
+    cycle_ = cycle;
+    return drills_ = true;
+  }
+
+  bool Drill(const Vector& entry) {
+    if (!cycle_) {
+      return false;  // after a CYCLE/ON that was refused
+    }
+    const double feed_mm_per_s = cycle_->feed_mm_per_s > 0.0 ? cycle_->feed_mm_per_s : feed_mm_per_s_;
+    if (!DrillsHere(feed_mm_per_s) || !WithinReach(entry) || !RiseOver(entry)) {
+      return false;
+    }
+    const double height = moved_ ? HeightOver(entry, position_) : 0.0;
+    if (height > cycle_->heights.clear_mm + kNoRise_mm) {
+      Move(OperationKind::kTraverse, Over(entry, height));
+    }
+    const std::vector<HoleStep> steps = StepsOf(cycle_->heights);
+    for (std::size_t i = 0; i < steps.size() && !stopped_; ++i) {
+      if (i + 1 == steps.size() && cycle_->dwell_s > 0.0) {
+        Add(OperationKind::kDwell)->value = cycle_->dwell_s;
+      }
+      Operation& o = Move(steps[i].feeds ? OperationKind::kFeedLine : OperationKind::kTraverse,
+                          Over(entry, steps[i].height_mm));
+      o.feed_mm_per_s = feed_mm_per_s;
+    }
+    return !stopped_;
+  }
+
+  bool DrillsHere(double feed_mm_per_s) {
+    if (kerf_offset_mm_ != 0.0) {
+      return Fault(statement_.place, "CYCLE_WITH_COMPENSATION", "TLCOMP/OFF must stand before a hole");
+    }
+    if (cycle_->feed_mm_per_s == 0.0 && move_s_ > 0.0) {
+      return Fault(statement_.place, "CYCLE_INVERSE_TIME", "a cycle feeds in millimetres or inches a minute");
+    }
+    if (axis_[2] < kLeastRise) {
+      return Leans();
+    }
+    return feed_mm_per_s > 0.0 ||
+           Fault(statement_.place, "FEED_MISSING", "CYCLE or FEDRAT must say the feed before the first hole");
+  }
+
+  Vector Over(const Vector& entry, double height_mm) const {
+    return {entry[0] + height_mm * axis_[0], entry[1] + height_mm * axis_[1],
+            entry[2] + height_mm * axis_[2]};
+  }
+
+  // Along the tool's axis over the plane of W in which the hole begins, as G81 counts.
+  double HeightOver(const Vector& entry, const Vector& p) const { return (p[2] - entry[2]) / axis_[2]; }
+
+  bool WithinReach(const Vector& entry) {
+    const HoleHeights& h = cycle_->heights;
+    for (const double height : {h.clear_mm, h.bottom_mm}) {
+      if (!CoordinatesFit(Over(entry, height))) {
+        return false;
+      }
+    }
+    return true;
+  }
+
+  bool CoordinatesFit(const Vector& p) {
+    const bool fit = std::all_of(p.begin(), p.end(),
+                                 [this](double x) { return std::abs(x) <= options_.largest_coordinate_mm; });
+    return fit || Fault(statement_.place, "COORDINATE_TOO_LARGE", "a coordinate is at most 1e6 mm");
+  }
+
+  // From below the height at which the next hole is gone to: out along the tool as it stands.
+  bool RiseOver(const Vector& entry) {
+    const double missing_mm = cycle_->heights.clear_mm - HeightOver(entry, position_);
+    if (!moved_ || missing_mm <= kNoRise_mm) {
+      return true;
+    }
+    if (stands_[2] < kLeastRise) {
+      return Leans();
+    }
+    const Vector axis = axis_;
+    axis_ = stands_;
+    const Vector risen = Over(position_, missing_mm * axis[2] / stands_[2]);
+    const bool fits = CoordinatesFit(risen);
+    if (fits) {
+      Move(OperationKind::kTraverse, risen);
+    }
+    axis_ = axis;
+    return fits;
+  }
+
+  bool Leans() {
+    return Fault(statement_.place, "CYCLE_TOOL_LEANS",
+                 "in a cycle, and on the way to it, the tool leans by at most 60 degrees from Z");
   }
 
   // ---- circles ----
@@ -908,6 +1087,7 @@ class Reader {
 
   Operation& Move(OperationKind kind, const Vector& target) {
     position_ = target;
+    stands_ = axis_;
     moved_ = true;
     Operation* o = Add(kind);
     o->kerf_offset_mm = kerf_offset_mm_;
@@ -935,13 +1115,19 @@ class Reader {
 
   Vector position_{};
   Vector axis_{0.0, 0.0, 1.0};
+  Vector stands_{0.0, 0.0, 1.0};  // the axis at the last motion's end
   bool multax_ = false;
+  std::optional<CldataCycle> cycle_;
+  bool drills_ = false;
   bool rapid_ = false;
   std::optional<Circle> circle_;
   double unit_mm_ = 1.0;
   double feed_mm_per_s_ = 0.0;
   double move_s_ = 0.0;  // inverse time feed: how long every move takes
   double spindle_per_min_ = 0.0;
+  double spindle_sense_ = 1.0;  // clockwise positive
+  double turns_per_min_ = 0.0;
+  bool spindle_turns_ = false;
   double cutter_mm_ = 0.0;
   double side_ = 0.0;
   double kerf_offset_mm_ = 0.0;

@@ -6,7 +6,9 @@
 // another statement between, as far as they lie on it: each is reached the shorter way round from the one before, which
 // gives the direction (posts disagree on what the axis' sign means); half a turn or more between two points is refused.
 // MOVARC says direction (right-handed about its axis) and angle itself. MULTAX lets GOTO carry the tool's axis (i, j, k),
-// kept as the rotary words A and B that the machine means by it (tool_axis.hpp).
+// kept as the rotary words A and B that the machine means by it (tool_axis.hpp). CYCLE makes every GOTO a hole, written out as
+// the G-code reader writes out G81, G82 and G83, along the tool's axis (cldata_cycle.hpp). The first way to a hole is at the
+// height where the tool is, or at the cycle's, whichever is higher; where it has to rise it does so along its axis first.
 // Frames: part coordinates are W. Units: as UNITS says in (millimetres before it), mm and mm/s out. Threads: pure.
 // Cost: about 0.5 us a line. Errors: as the G-code reader, the same reasons for the same troubles.
 #pragma once
@@ -24,6 +26,7 @@ struct CldataOptions {
   ToolAngles tool_angles = ToolAngles::kRotaryHead;
   double arc_radius_tolerance_mm = 0.0127;  // how far a point may lie from its circle
   double largest_coordinate_mm = 1e6;
+  SpindleRange spindle = {};  // of a machine that moves Z
   std::size_t fault_limit = 100;
   std::size_t operation_limit = 20'000'000;
 };

@@ -163,6 +163,18 @@ class Writer {
       case OperationKind::kCameraTrackOff:
         Line("AUXFUN/102");
         break;
+      case OperationKind::kSpindleOn:
+        Line("SPINDL/" + Exact(std::abs(o.value)) + (o.value > 0.0 ? ",RPM,CLW" : ",RPM,CCLW"));
+        break;
+      case OperationKind::kSpindleOff:
+        Line("SPINDL/OFF");
+        break;
+      case OperationKind::kCoolantOn:
+        Line("COOLNT/ON");
+        break;
+      case OperationKind::kCoolantOff:
+        Line("COOLNT/OFF");
+        break;
       default:
         Fault(o, "NOT_WRITABLE", "CLDATA has no word for this operation");
     }

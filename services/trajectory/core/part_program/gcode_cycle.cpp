@@ -11,7 +11,6 @@ namespace {
 
 constexpr double kPeckClearance_mm = 0.254;
 constexpr double kMostRepeats = 9999.0;
-constexpr double kMostPecks = 10'000.0;
 constexpr double kLongestDwell_s = 3600.0;
 constexpr std::size_t kZ = 2;
 

@@ -6,7 +6,7 @@
 namespace lambdajet::trajectory {
 namespace {
 
-constexpr std::array<std::string_view, 19> kNames = {"TRAVERSE",
+constexpr std::array<std::string_view, 23> kNames = {"TRAVERSE",
                                                      "FEED_LINE",
                                                      "FEED_ARC",
                                                      "DWELL",
@@ -24,7 +24,11 @@ constexpr std::array<std::string_view, 19> kNames = {"TRAVERSE",
                                                      "DISTANCE_CHANGE",
                                                      "WORK_OFFSET_CHANGE",
                                                      "PATH_TOLERANCE",
-                                                     "END"};
+                                                     "END",
+                                                     "SPINDLE_ON",
+                                                     "SPINDLE_OFF",
+                                                     "COOLANT_ON",
+                                                     "COOLANT_OFF"};
 
 void Append(std::string& text, const char* key, double value) {
   char number[48];
@@ -105,6 +109,9 @@ std::string FormatOperation(const Operation& o) {
     case OperationKind::kMeasure:
     case OperationKind::kCameraTrackOn:
       Append(text, "mark", o.value);
+      break;
+    case OperationKind::kSpindleOn:
+      Append(text, "speed_per_min", o.value);
       break;
     case OperationKind::kUnitsChange:
       Append(text, "unit_mm", o.value);

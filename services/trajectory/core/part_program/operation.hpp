@@ -33,6 +33,10 @@ enum class OperationKind : std::uint8_t {
   kWorkOffsetChange,  // value: 54 … 59.3; x, y: the offset
   kPathTolerance,     // value: mm; 0: visit every corner exactly (G61)
   kEnd,
+  kSpindleOn,  // value: turns a minute, clockwise positive; stands still until the spindle turns so
+  kSpindleOff,
+  kCoolantOn,  // on the fly, of a machine with a spindle
+  kCoolantOff,
 };
 
 // UPPER_SNAKE.
@@ -75,6 +79,12 @@ struct Operation {
   double feed_mm_per_s = 0.0;   // feed line, arc and change: along the path in X, Y, Z
   double kerf_offset_mm = 0.0;  // motion: signed offset of the jet from the programmed contour, left positive
   double value = 0.0;           // as its kind says; feed line and arc: s, where it has a duration and no feed
+};
+
+// The speeds of a spindle. Machines that move Z have one, where others have a jet.
+struct SpindleRange {
+  double least_per_min = 0.0;
+  double most_per_min = 1e6;  // 0: the machine has no spindle
 };
 
 // Something in a program that is not understood or cannot be done.

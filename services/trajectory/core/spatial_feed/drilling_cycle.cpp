@@ -44,39 +44,46 @@ void AlignWithTool(std::span<Operation> moves, double surface_W_mm) {
   }
 }
 
-void AppendDrilledHole(const DrilledHole& hole, std::vector<Operation>& operations) {
-  Expects(hole.bottom_mm < hole.retract_mm && hole.clear_mm >= hole.retract_mm && hole.peck_mm >= 0.0,
-          "AppendDrilledHole: the bottom lies below R, R not above the clear height, and pecks go down");
-  const auto add = [&](double height_mm, OperationKind kind) {
-    operations.push_back(MoveTo(hole, height_mm, kind));
-  };
-  add(hole.clear_mm, OperationKind::kTraverse);
-  if (hole.clear_mm > hole.retract_mm) {
-    add(hole.retract_mm, OperationKind::kTraverse);
+std::vector<HoleStep> StepsOf(const HoleHeights& h) {
+  Expects(h.bottom_mm < h.retract_mm && h.clear_mm >= h.retract_mm && h.peck_mm >= 0.0,
+          "StepsOf: the bottom lies below R, R not above the clear height, and pecks go down");
+  std::vector<HoleStep> steps = {{h.clear_mm, false}};
+  if (h.clear_mm > h.retract_mm) {
+    steps.push_back({h.retract_mm, false});
   }
-  const double peck = hole.peck_mm > 0.0 ? hole.peck_mm : hole.retract_mm - hole.bottom_mm;
+  const double peck = h.peck_mm > 0.0 ? h.peck_mm : h.retract_mm - h.bottom_mm;
   // Counted, not summed up, so that the last peck is not a splinter of rounding.
-  const auto pecks = static_cast<int>(std::ceil((hole.retract_mm - hole.bottom_mm) / peck - 1e-9));
+  const auto pecks = static_cast<int>(std::ceil((h.retract_mm - h.bottom_mm) / peck - 1e-9));
   for (int i = 1; i < pecks; ++i) {
-    const double depth = hole.retract_mm - i * peck;
-    add(depth, OperationKind::kFeedLine);
-    if (hole.chip_break) {
-      add(depth + kChipGap_mm, OperationKind::kTraverse);
+    const double depth = h.retract_mm - i * peck;
+    steps.push_back({depth, true});
+    if (h.chip_break) {
+      steps.push_back({depth + kChipGap_mm, false});
     } else {
-      add(hole.retract_mm, OperationKind::kTraverse);
-      add(std::min(hole.retract_mm, depth + kChipGap_mm), OperationKind::kTraverse);
+      steps.push_back({h.retract_mm, false});
+      steps.push_back({std::min(h.retract_mm, depth + kChipGap_mm), false});
     }
   }
-  add(hole.bottom_mm, OperationKind::kFeedLine);
-  if (hole.dwell_s > 0.0) {
-    Operation dwell;
-    dwell.kind = OperationKind::kDwell;
-    dwell.axes = kSixAxes;
-    dwell.line = hole.line;
-    dwell.value = hole.dwell_s;
-    operations.push_back(dwell);
+  steps.push_back({h.bottom_mm, true});
+  steps.push_back({h.clear_mm, false});
+  return steps;
+}
+
+void AppendDrilledHole(const DrilledHole& hole, std::vector<Operation>& operations) {
+  const std::vector<HoleStep> steps =
+      StepsOf({hole.clear_mm, hole.retract_mm, hole.bottom_mm, hole.peck_mm, hole.chip_break});
+  for (std::size_t i = 0; i < steps.size(); ++i) {
+    if (i + 1 == steps.size() && hole.dwell_s > 0.0) {
+      Operation dwell;
+      dwell.kind = OperationKind::kDwell;
+      dwell.axes = kSixAxes;
+      dwell.line = hole.line;
+      dwell.value = hole.dwell_s;
+      operations.push_back(dwell);
+    }
+    operations.push_back(MoveTo(hole, steps[i].height_mm,
+                                steps[i].feeds ? OperationKind::kFeedLine : OperationKind::kTraverse));
   }
-  add(hole.clear_mm, OperationKind::kTraverse);
 }
 
 }  // namespace lambdajet::trajectory

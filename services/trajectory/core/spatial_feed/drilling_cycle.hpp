@@ -1,4 +1,4 @@
-// Writes drilling cycles (G81, G82, G83, G73) out as canonical moves along a tool axis that may be tilted.
+// Writes drilling cycles (G81, G82, G83, G73 and CYCLE of CLDATA) out as moves along a tool axis that may be tilted.
 //
 // Model: LinuxCNC's canned cycles with heights measured along the tool's axis from the place where it enters the part, so
 // that at A0 B0 they are LinuxCNC's own: traverse over the hole at the higher of where the tool is and the clear height,
@@ -15,6 +15,25 @@
 #include "trajectory/core/part_program/operation.hpp"
 
 namespace lambdajet::trajectory {
+
+// Heights along the tool's axis over the place where it enters the part.
+struct HoleHeights {
+  double clear_mm = 0.0;    // where the cycle begins and ends, not below R
+  double retract_mm = 0.0;  // R, where it begins to feed
+  double bottom_mm = 0.0;   // Z, below R
+  double peck_mm = 0.0;     // Q; 0: in one go
+  bool chip_break = false;  // G73: back by 0.254 mm instead of out to R
+};
+
+struct HoleStep {
+  double height_mm = 0.0;
+  bool feeds = false;
+};
+
+inline constexpr double kMostPecks = 10'000.0;
+
+// The moves of one hole, the first over it; a dwell belongs behind the last that feeds.
+std::vector<HoleStep> StepsOf(const HoleHeights& heights);
 
 struct DrilledHole {
   Eigen::Vector3d entry_W_mm = Eigen::Vector3d::Zero();  // the axis goes through it; heights count from it

@@ -62,8 +62,8 @@ std::uint64_t IdOf(const std::vector<Operation>& operations, const HexapodGeomet
   for (const double value :
        {g.screw_lead_mm, m.strut_velocity_mm_per_s, m.strut_acceleration_mm_per_s2, m.strut_jerk_mm_per_s3,
         m.feed_mm_per_s, m.rapid_mm_per_s, m.path_acceleration_mm_per_s2, m.path_jerk_mm_per_s3,
-        m.corner_tolerance_mm, m.corner_tolerance_rad, options.feed_scale, options.knot_s,
-        static_cast<double>(options.knots_per_segment)}) {
+        m.corner_tolerance_mm, m.corner_tolerance_rad, m.spindle_most_per_min, m.spindle_run_up_s,
+        options.feed_scale, options.knot_s, static_cast<double>(options.knots_per_segment)}) {
     hash.Add(value);
   }
   return hash.value();
@@ -151,7 +151,7 @@ class ProgramPlanner {
     const auto id = static_cast<std::uint32_t>(out_.plan.gates.size() + 1);
     out_.plan.gates.push_back({id, run.gate, s_mm_, run.gate_argument, run.gate_line});
     out_.plan.segments.back().gate_at_end = id;
-    if (run.gate == GateKind::kDwell || run.gate == GateKind::kPierce) {
+    if (run.gate == GateKind::kDwell) {
       out_.gate_time_s += run.gate_argument;
     }
   }

@@ -166,7 +166,7 @@ class Player {
   void StandAt(const SpatialSegment& segment) {
     Settle(segment);
     const Gate& gate = plan_.gates[segment.gate_at_end - 1];
-    if (gate.kind == GateKind::kDwell || gate.kind == GateKind::kPierce) {
+    if (gate.kind == GateKind::kDwell) {
       cycles_in_all_ += static_cast<std::uint64_t>(std::llround(gate.argument / options_.cycle_s));
     }
   }

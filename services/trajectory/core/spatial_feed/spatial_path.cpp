@@ -52,8 +52,6 @@ class PathBuilder {
         return;
       case OperationKind::kDwell:
         return StandStill(GateKind::kDwell, o);
-      case OperationKind::kPierce:
-        return StandStill(GateKind::kPierce, o);
       case OperationKind::kMeasure:
         return StandStill(GateKind::kMeasure, o);
       case OperationKind::kStop:
@@ -68,7 +66,26 @@ class PathBuilder {
       case OperationKind::kEnd:
         return;
       default:
-        Event(o);
+        Switch(o);
+    }
+  }
+
+  void Switch(const Operation& o) {
+    switch (o.kind) {
+      case OperationKind::kSpindleOn:
+        return Spindle(o, o.value);
+      case OperationKind::kSpindleOff:
+        return Spindle(o, 0.0);
+      case OperationKind::kCoolantOn:
+        return Event(o, SpatialAction::kCoolantOn, 0.0);
+      case OperationKind::kCoolantOff:
+        return Event(o, SpatialAction::kCoolantOff, 0.0);
+      case OperationKind::kCameraTrackOn:
+        return Event(o, SpatialAction::kCameraTrackOn, o.value);
+      case OperationKind::kCameraTrackOff:
+        return Event(o, SpatialAction::kCameraTrackOff, 0.0);
+      default:
+        Refuse(o);
     }
   }
 
@@ -183,13 +200,25 @@ class PathBuilder {
     path_.runs.emplace_back();
   }
 
-  void Event(const Operation& o) {
-    static_assert(static_cast<int>(OperationKind::kCameraTrackOff) -
-                      static_cast<int>(OperationKind::kJetOn) ==
-                  static_cast<int>(ProcessAction::kCameraTrackOff));
-    const auto action =
-        static_cast<ProcessAction>(static_cast<int>(o.kind) - static_cast<int>(OperationKind::kJetOn));
-    path_.runs.back().events.push_back({action, path_.runs.back().length_mm(), o.value, o.line});
+  void Event(const Operation& o, SpatialAction action, double argument) {
+    path_.runs.back().events.push_back({action, path_.runs.back().length_mm(), argument, o.line});
+  }
+
+  // Nobody waits for it to stop.
+  void Spindle(const Operation& o, double turns_per_min) {
+    Event(o, SpatialAction::kSpindle, turns_per_min);
+    Operation wait = o;
+    wait.value = turns_per_min != 0.0 && motion_.spindle_most_per_min > 0.0
+                     ? motion_.spindle_run_up_s * std::abs(turns_per_min - spindle_per_min_) /
+                           motion_.spindle_most_per_min
+                     : 0.0;
+    spindle_per_min_ = turns_per_min;
+    StandStill(GateKind::kDwell, wait);
+  }
+
+  void Refuse(const Operation& o) {
+    path_.faults.push_back({o.line, 0, "OPERATION_NOT_DRIVEN", std::string(OperationName(o.kind)),
+                            "a hexapod has a spindle and its coolant, no jet"});
   }
 
   const HexapodMotion& motion_;
@@ -200,6 +229,7 @@ class PathBuilder {
   bool moved_ = false;
   Vector3d here_ = Vector3d::Zero();
   Quaterniond q_here_ = Quaterniond::Identity();
+  double spindle_per_min_ = 0.0;
   SpatialPath path_;
 };
 

@@ -7,6 +7,7 @@
 // A run ends where the machine stands still: at gates, at exact corners (G61), where the path turns back by more than 100
 // degrees, and at the end. Such places are met exactly; other corners are rounded within the tolerances.
 // The rotary words are roll, pitch, yaw about the fixed axes x, y, z of W (LinuxCNC's hexapods have the same).
+// At a change of the spindle's speed the machine stands still for as long as its description says that it takes.
 // Frames: W, z from the part to the spindle. Units: mm, rad, mm/s, s. Threads: values and pure functions.
 #pragma once
 
@@ -16,7 +17,7 @@
 #include <vector>
 
 #include "foundation/machine/hexapod_motion.hpp"
-#include "foundation/motion/plan.hpp"
+#include "foundation/motion/spatial_plan.hpp"
 #include "trajectory/core/part_program/operation.hpp"
 
 namespace lambdajet::trajectory {
@@ -53,7 +54,7 @@ struct SpatialPoint {
 SpatialPoint PointOn(const SpatialPiece& piece, double offset_mm);
 
 struct SpatialEvent {
-  ProcessAction action = ProcessAction::kJetOff;
+  SpatialAction action = SpatialAction::kSpindle;
   double offset_mm = 0.0;
   double argument = 0.0;
   std::uint32_t line = 0;

@@ -59,6 +59,7 @@ PartProgram ReadSpatialProgram(std::string_view text, const HexapodMotion& motio
   options.gcode.default_tolerance_mm = motion.corner_tolerance_mm;
   options.gcode.kerf_compensation = false;
   options.cldata.tool_angles = ToolAngles::kRollPitch;
+  options.cldata.spindle = {motion.spindle_least_per_min, motion.spindle_most_per_min};
   PartProgram program = ReadPartProgram(text, options);
   const auto moved = std::find_if(program.operations.begin(), program.operations.end(),
                                   [](const Operation& o) { return o.kerf_offset_mm != 0.0; });
