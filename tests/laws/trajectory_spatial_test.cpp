@@ -487,8 +487,8 @@ TEST(SpatialProgram, IsAdmittedOrRefusedAtTheRightCheck) {
   refused("G0 X-60 Z20\nG3 X60 I60 J-200 F600\nM2\n", AdmissionCheck::kReach, "ACTUATOR_LIMIT", 2);
   refused("PARTNO A\nMULTAX/ON\nFROM/0,0,20,0,0,1\nFEDRAT/600,MMPM\nGOTO/0,0,20,0,1,0\nFINI\n",
           AdmissionCheck::kPlace, "ACTUATOR_LIMIT", 5);
-  refused("PARTNO A\nFROM/0,0,20\nCYCLE/DRILL,12,600,MMPM,2\nFINI\n", AdmissionCheck::kParse, "UNKNOWN_WORD",
-          3);
+  refused("PARTNO A\nFROM/0,0,20\nCYCLE/TAP,DEPTH,12,MMPM,600,CLEAR,2\nFINI\n", AdmissionCheck::kParse,
+          "CYCLE_UNKNOWN", 3);
   refused("PARTNO A\nFROM/0,0,20\nFEDRAT/600,MMPM\nCUTTER/6\nTLCOMP/LEFT\nGOTO/9,0,20\nFINI\n",
           AdmissionCheck::kParse, "COMPENSATION_NOT_SUPPORTED", 6);
 }
