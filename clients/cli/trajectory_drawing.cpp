@@ -255,8 +255,7 @@ absl::Status TellLineStart(const LineVerb& verb, Output& output) {
     const auto rest =
         OperationsText(start.operations, verb.program + " from line " + std::to_string(verb.line));
     if (!rest) {
-      output.Fail(ExitCode::kRefused, "NOT_AS_TEXT",
-                  "an arc outside G17 is not written out");
+      output.Fail(ExitCode::kRefused, "NOT_AS_TEXT", "an arc outside G17 is not written out");
       return absl::OkStatus();
     }
     return WriteTextFile(verb.out, *rest);
@@ -275,6 +274,7 @@ absl::Status TellLineStart(const LineVerb& verb, Output& output) {
                {"path_tolerance_mm", s.path_tolerance_mm},
                {"jet_on", s.jet_on},
                {"abrasive_on", s.abrasive_on},
+               {"abrasive_flow_g_per_min", s.abrasive_flow_g_per_min},
                {"restored_operations", start.restored_count},
                {"operations", start.operations.size()}});
   return absl::OkStatus();

@@ -37,6 +37,8 @@ inline MachineDescription DemoLikeMachine() {
   m.actuators[0] = m.actuators[1] = {-1600.0, 2600.0, 1500.0, 15000.0, 400000.0};
   m.path = {120.0, 300.0, 1050.0, 20000.0, 0.02};
   m.process.kerf_width_mm = 0.8;
+  m.process.abrasive_flow_g_per_min = 350.0;
+  m.process.abrasive_flow_max_g_per_min = 800.0;
   m.process.jet_lag_time_s = 0.003;
   m.process.pierce_time_s = 0.6;
   m.sheet_width_mm = 800.0;

@@ -448,7 +448,8 @@ TEST(StartFromLineLaw, RestoredStateIsTheReplayedOneAtEveryLine) {
   const std::string text =
       "G21 G90 G54\nG10 L2 P2 X30 Y40\nG64 P0.05\nG0 X10 Y10\nM3\nF1200\nG1 X50\nM9\nG1 "
       "Y50\nM5\nG55\nG91\nG0 X5 Y5\n"
-      "M8\nM62 P0\nG20\nF50\nG1 X1\nG3 X1 Y1 I0 J1\nM63 P1\nM5\nG61\nG90 G54 G21\nG0 X0 Y0\nM101 P3\nG1 "
+      "M8 M67 E0 Q320\nM62 P0\nG20\nF50\nG1 X1\nG3 X1 Y1 I0 J1\nM63 P1\nM5\nG61\nG90 G54 G21\nG0 X0 Y0\nM101 "
+      "P3\nG1 "
       "X100\nM102\nM2\n";
   const PartProgram program = ReadGcode(text);
   ASSERT_TRUE(program.faults.empty()) << program.faults[0].message;
@@ -471,7 +472,7 @@ TEST(StartFromLineLaw, WrittenOutItIsTheRestOfTheProgram) {
   const PartProgram program = ReadGcode(
       "G20 G91\nG10 L2 P1 X1 Y2\nG54\nF40\nG0 X1 Y1\nM3 P0.5\nG1 X2\nG3 X0 Y0 I1 J0 P2\nG2 X1 Y1 R1\nG64 "
       "P0.001\nM9\nG1 Y1\nM8\n"
-      "M5\nG4 P1\nM0\nG0 X1\nM62 P0\nG1 X1\nM5\nM2\n");
+      "M5\nG4 P1 M67 E0 Q200.5\nM0 M66 P1 L4 Q2\nG0 X1\nM62 P0\nG1 X1\nM5\nM2\n");
   ASSERT_TRUE(program.faults.empty()) << program.faults[0].message;
   for (std::uint32_t line = 1; line <= 19; ++line) {
     const LineStart start = StartFromLine(program.operations, line);
@@ -498,6 +499,7 @@ TEST(StartFromLineLaw, WrittenOutItIsTheRestOfTheProgram) {
         EXPECT_NEAR(a[i].y_W_mm, b[i].y_W_mm, 1e-6);
       }
       EXPECT_NEAR(a[i].sweep_rad, b[i].sweep_rad, 1e-6);
+      EXPECT_EQ(a[i].condition, b[i].condition);
     }
   }
 }

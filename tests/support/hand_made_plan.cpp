@@ -81,10 +81,15 @@ void HandMadePlan::CircleAround(double x_W_mm, double y_W_mm, double speed_mm_pe
       2.0 * std::numbers::pi * r, speed_mm_per_s);
 }
 
-void HandMadePlan::Gate(GateKind kind, double argument) {
+void HandMadePlan::Gate(GateKind kind, double argument, InputCondition condition) {
   Expects(!plan_.segments.empty(), "a gate stands at a segment's end");
   const auto id = static_cast<std::uint32_t>(plan_.gates.size()) + 1;
-  plan_.gates.push_back({.id = id, .kind = kind, .s_mm = s_mm_, .argument = argument, .source_line = 0});
+  plan_.gates.push_back({.id = id,
+                         .kind = kind,
+                         .s_mm = s_mm_,
+                         .argument = argument,
+                         .source_line = 0,
+                         .condition = condition});
   plan_.segments.back().gate_at_end = id;
 }
 

@@ -23,7 +23,7 @@ class HandMadePlan {
   void LineTo(double x_W_mm, double y_W_mm, double speed_mm_per_s);
   // Once round, counter-clockwise, from where the path stands.
   void CircleAround(double x_W_mm, double y_W_mm, double speed_mm_per_s);
-  void Gate(GateKind kind, double argument);
+  void Gate(GateKind kind, double argument, InputCondition condition = {});
   void Event(ProcessAction action, double argument = 0.0);
   void EventAt(ProcessAction action, double s_mm, double argument = 0.0);  // in path order
   double s_mm() const { return s_mm_; }

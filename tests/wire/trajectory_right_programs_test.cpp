@@ -66,6 +66,7 @@ void ExpectSame(const std::vector<Operation>& got, const std::vector<Operation>&
     EXPECT_NEAR(a.c_rad, b.c_rad, kSame);
     EXPECT_NEAR(a.value, b.value, kSame);
     EXPECT_NEAR(a.kerf_offset_mm, b.kerf_offset_mm, kSame);
+    EXPECT_EQ(a.condition, b.condition);
     if (a.kind == OperationKind::kFeedArc) {
       EXPECT_EQ(a.plane, b.plane);
       EXPECT_NEAR(a.center_x_W_mm, b.center_x_W_mm, kSame);

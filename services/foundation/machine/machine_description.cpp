@@ -7,10 +7,13 @@ namespace lambdajet {
 namespace {
 
 constexpr std::array<std::string_view, kParameterCount> kNames = {
-    "main_link_length_mm", "attach_length_mm", "second_link_length_mm", "rail_1_angle_rad", "rail_1_offset_mm",
-    "rail_2_angle_rad",    "rail_2_offset_mm", "slider_1_zero_mm",      "slider_2_zero_mm", "base_x_mm",
-    "base_y_mm",           "base_theta_rad",   "sheet_x_mm",            "sheet_y_mm",       "sheet_theta_rad",
-    "camera_x_mm",         "camera_y_mm",      "elastic_lag_s2",        "damping_time_s"};
+    "main_link_length_mm", "attach_length_mm", "second_link_length_mm",
+    "rail_1_angle_rad",    "rail_1_offset_mm", "rail_2_angle_rad",
+    "rail_2_offset_mm",    "slider_1_zero_mm", "slider_2_zero_mm",
+    "base_x_mm",           "base_y_mm",        "base_theta_rad",
+    "sheet_x_mm",          "sheet_y_mm",       "sheet_theta_rad",
+    "camera_x_mm",         "camera_y_mm",      "elastic_lag_s2",
+    "damping_time_s"};
 
 class Faults {
  public:
@@ -40,7 +43,8 @@ void CheckParameters(const MachineDescription& machine, Faults& faults) {
     const double value = machine.parameters[static_cast<Eigen::Index>(i)];
     faults.Require(std::isfinite(value), "parameters." + std::string(kNames[i]), value, "a finite number");
   }
-  for (const Parameter p : {Parameter::kMainLinkLengthMm, Parameter::kAttachLengthMm, Parameter::kSecondLinkLengthMm}) {
+  for (const Parameter p :
+       {Parameter::kMainLinkLengthMm, Parameter::kAttachLengthMm, Parameter::kSecondLinkLengthMm}) {
     faults.Positive("parameters." + std::string(ParameterName(p)), machine.value(p));
   }
   faults.NotNegative("parameters.elastic_lag_s2", machine.value(Parameter::kElasticLagS2));
@@ -86,6 +90,8 @@ void CheckProcess(const MachineDescription& machine, Faults& faults) {
   faults.NotNegative("process.jet_off_delay_s", p.jet_off_delay_s);
   faults.NotNegative("process.abrasive_on_delay_s", p.abrasive_on_delay_s);
   faults.NotNegative("process.abrasive_off_delay_s", p.abrasive_off_delay_s);
+  faults.NotNegative("process.abrasive_flow_g_per_min", p.abrasive_flow_g_per_min);
+  faults.NotNegative("process.abrasive_flow_max_g_per_min", p.abrasive_flow_max_g_per_min);
   faults.NotNegative("process.measuring_settle_time_s", p.measuring_settle_time_s);
   const Uncertainties& u = machine.uncertainties;
   faults.NotNegative("uncertainties.straightness_mm", u.straightness_mm);
@@ -119,8 +125,10 @@ std::vector<DescriptionFault> Validate(const MachineDescription& machine) {
   CheckParameters(machine, faults);
   CheckLimits(machine, faults);
   CheckProcess(machine, faults);
-  faults.Require(std::abs(machine.working_mode.s1) == 1, "working_mode.s1", machine.working_mode.s1, "-1 or 1");
-  faults.Require(std::abs(machine.working_mode.s2) == 1, "working_mode.s2", machine.working_mode.s2, "-1 or 1");
+  faults.Require(std::abs(machine.working_mode.s1) == 1, "working_mode.s1", machine.working_mode.s1,
+                 "-1 or 1");
+  faults.Require(std::abs(machine.working_mode.s2) == 1, "working_mode.s2", machine.working_mode.s2,
+                 "-1 or 1");
   faults.Require(std::abs(machine.assembly_mode) == 1, "assembly_mode", machine.assembly_mode, "-1 or 1");
   faults.Positive("moving_mass_kg", machine.moving_mass_kg);
   faults.Positive("sheet_width_mm", machine.sheet_width_mm);

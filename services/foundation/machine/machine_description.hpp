@@ -88,6 +88,8 @@ struct ProcessModel {
   double jet_off_delay_s = 0.0;
   double abrasive_on_delay_s = 0.0;
   double abrasive_off_delay_s = 0.0;
+  double abrasive_flow_g_per_min = 0.0;      // that a plan begins with
+  double abrasive_flow_max_g_per_min = 0.0;  // 0: a program cannot set the flow
   double measuring_settle_time_s = 0.0;  // stand still this long before the camera looks
 };
 

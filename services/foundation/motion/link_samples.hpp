@@ -87,6 +87,7 @@ struct MainMotionState {
   bool abrasive_on = false;
   double pump_pressure_mpa = 0.0;
   double abrasive_g_per_min = 0.0;
+  bool abrasive_present = false;
   double stand_off_mm = 0.0;
   double s_extrapolated_mm = 0.0;
   CommandReceipt command;
@@ -155,6 +156,7 @@ struct ProcessRecord {
   std::uint64_t plan = 0;
   std::uint32_t event = 0;
   ProcessAction action = ProcessAction::kJetOff;
+  double argument = 0.0;
   double s_wanted_mm = 0.0;
   double s_rate_mm_per_s = 0.0;
   std::int64_t due_ns = 0;

@@ -12,7 +12,7 @@ constexpr std::array<std::string_view, 13> kModes = {
 constexpr std::array<std::string_view, 13> kVerbs = {"NONE",   "LOAD",    "ARM",      "START", "HOLD",
                                                      "RESUME", "RETRACE", "OVERRIDE", "STOP",  "RESET",
                                                      "HOME",   "UNLOAD",  "JOG"};
-constexpr std::array<std::string_view, 19> kReasons = {"NONE",
+constexpr std::array<std::string_view, 21> kReasons = {"NONE",
                                                        "COMMANDED",
                                                        "PEER_LOST",
                                                        "PEER_STOPPED",
@@ -30,7 +30,9 @@ constexpr std::array<std::string_view, 19> kReasons = {"NONE",
                                                        "SENSOR_FAULT",
                                                        "NO_MACHINE_DESCRIPTION",
                                                        "GATE_TIMEOUT",
-                                                       "STALE_COMMAND"};
+                                                       "STALE_COMMAND",
+                                                       "INPUT_TIMEOUT",
+                                                       "JET_NOT_CLOSED"};
 
 template <std::size_t N>
 std::string_view At(const std::array<std::string_view, N>& names, std::uint32_t index) {

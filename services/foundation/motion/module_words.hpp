@@ -61,7 +61,9 @@ enum class ModuleReason : std::uint32_t {
   kSensorFault,
   kNoMachineDescription,
   kGateTimeout,
-  kStaleCommand
+  kStaleCommand,
+  kInputTimeout,  // an input for which the program waits did not come in time
+  kJetNotClosed   // water still flows long after the valve was told to close
 };
 
 // UPPER_SNAKE, as on every wire: "PEER_LOST".

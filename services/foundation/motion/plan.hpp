@@ -30,20 +30,46 @@ struct Polynomial {
   double third(double t) const { return (60 * c[5] * t + 24 * c[4]) * t + 6 * c[3]; }
 };
 
-enum class GateKind : std::uint8_t { kNone, kPierce, kMeasure, kDwell, kStop };
+enum class GateKind : std::uint8_t { kNone, kPierce, kMeasure, kDwell, kStop, kInput };
+
+// What main motion can tell of itself while the drive waits.
+enum class ProcessInput : std::uint8_t {
+  kPumpAtPressure,   // the pump gives the pressure to cut with
+  kAbrasivePresent,  // the hopper holds abrasive
+};
+inline constexpr std::uint32_t kProcessInputs = 2;
+
+// Rise and fall: a change after the gate was reached; high and low: also what is so already.
+enum class InputEvent : std::uint8_t { kNone, kRise, kFall, kHigh, kLow };
+
+inline constexpr std::uint32_t kInputEvents = 5;
+
+// Both in one byte, as a long program holds one in each of its operations.
+struct InputCondition {
+  std::uint8_t code = 0;  // 8 * input + event
+
+  static InputCondition Of(ProcessInput input, InputEvent event) {
+    return {static_cast<std::uint8_t>(8 * static_cast<int>(input) + static_cast<int>(event))};
+  }
+  ProcessInput input() const { return static_cast<ProcessInput>(code / 8); }
+  InputEvent event() const { return static_cast<InputEvent>(code % 8); }
+  friend bool operator==(const InputCondition&, const InputCondition&) = default;
+};
 
 // A place on the path where the drive stands still until main motion reports the gate as passed. A dwell is passed by
-// the drive itself after its time; a stop (M0) by the operator's resume.
+// the drive itself after its time; a stop (M0) by the operator's resume; an input by its event, and where that does not
+// come in time both modules hold.
 struct Gate {
   std::uint32_t id = 0;         // 1, 2, … in path order; 0 is no gate
   GateKind kind = GateKind::kNone;
   double s_mm = 0.0;
-  double argument = 0.0;        // pierce and dwell: s; measure: id of the mark
+  double argument = 0.0;        // pierce, dwell, and the longest wait for an input: s; measure: id of the mark
   std::uint32_t source_line = 0;
+  InputCondition condition;     // of an input
 };
 
 enum class ProcessAction : std::uint8_t {
-  kJetOn, kJetOff, kAbrasiveOn, kAbrasiveOff, kCameraTrackOn, kCameraTrackOff
+  kJetOn, kJetOff, kAbrasiveOn, kAbrasiveOff, kCameraTrackOn, kCameraTrackOff, kAbrasiveFlow
 };
 
 // Something main motion does when the path length reaches s_mm, early by its valve's delay, at its own instant.
@@ -52,7 +78,7 @@ struct ProcessEvent {
   std::uint32_t index = 0;      // 0, 1, … in path order
   ProcessAction action = ProcessAction::kJetOff;
   double s_mm = 0.0;
-  double argument = 0.0;        // camera track: id of the mark
+  double argument = 0.0;        // camera track: id of the mark; abrasive flow: g/min
   std::uint32_t source_line = 0;
 };
 

@@ -16,10 +16,10 @@ namespace {
 
 constexpr std::uint32_t kModes = static_cast<std::uint32_t>(ModuleMode::kFault) + 1;
 constexpr std::uint32_t kVerbs = static_cast<std::uint32_t>(Verb::kJog) + 1;
-constexpr std::uint32_t kReasons = static_cast<std::uint32_t>(ModuleReason::kStaleCommand) + 1;
+constexpr std::uint32_t kReasons = static_cast<std::uint32_t>(ModuleReason::kJetNotClosed) + 1;
 constexpr std::uint32_t kAnswers = static_cast<std::uint32_t>(CommandAnswer::kRefused) + 1;
-constexpr std::uint32_t kGateKinds = static_cast<std::uint32_t>(GateKind::kStop) + 1;
-constexpr std::uint32_t kActions = static_cast<std::uint32_t>(ProcessAction::kCameraTrackOff) + 1;
+constexpr std::uint32_t kGateKinds = static_cast<std::uint32_t>(GateKind::kInput) + 1;
+constexpr std::uint32_t kActions = static_cast<std::uint32_t>(ProcessAction::kAbrasiveFlow) + 1;
 
 bool Finite(std::initializer_list<double> numbers) {
   return std::all_of(numbers.begin(), numbers.end(), [](double n) { return std::isfinite(n); });
@@ -68,6 +68,16 @@ template <typename Wire>
 bool LinkFromWire(const Wire& wire, LinkFigures& figures) {
   figures = {wire.clock_error_bound_s(), wire.clock_offset_s(), wire.link_round_trip_s()};
   return Finite({figures.clock_error_bound_s, figures.clock_offset_s, figures.round_trip_s});
+}
+
+bool TakeCondition(const idl::trajectory::v1::Gate& wire, InputCondition& condition) {
+  ProcessInput input{};
+  InputEvent event{};
+  if (!Take(wire.input(), kProcessInputs, input) || !Take(wire.input_event(), kInputEvents, event)) {
+    return false;
+  }
+  condition = InputCondition::Of(input, event);
+  return true;
 }
 
 void ToWire(const Segment& segment, idl::trajectory::v1::Segment& wire) {
@@ -187,6 +197,7 @@ void ToWire(const MainMotionState& sample, idl::main_motion::v1::State& wire) {
   wire.abrasive_on(sample.abrasive_on);
   wire.pump_pressure_mpa(sample.pump_pressure_mpa);
   wire.abrasive_g_per_min(sample.abrasive_g_per_min);
+  wire.abrasive_present(sample.abrasive_present);
   wire.stand_off_mm(sample.stand_off_mm);
   wire.s_extrapolated_mm(sample.s_extrapolated_mm);
   wire.peer_session(sample.peer_session);
@@ -209,6 +220,7 @@ bool FromWire(const idl::main_motion::v1::State& wire, MainMotionState& sample) 
   sample.abrasive_on = wire.abrasive_on();
   sample.pump_pressure_mpa = wire.pump_pressure_mpa();
   sample.abrasive_g_per_min = wire.abrasive_g_per_min();
+  sample.abrasive_present = wire.abrasive_present();
   sample.stand_off_mm = wire.stand_off_mm();
   sample.s_extrapolated_mm = wire.s_extrapolated_mm();
   sample.peer_session = wire.peer_session();
@@ -266,12 +278,14 @@ void ToWire(const ProcessRecord& sample, idl::main_motion::v1::ProcessRecord& wi
   wire.deviation_mm(sample.deviation_mm);
   wire.peer_age_s(sample.peer_age_s);
   wire.action(Number(sample.action));
+  wire.argument(sample.argument);
 }
 
 bool FromWire(const idl::main_motion::v1::ProcessRecord& wire, ProcessRecord& sample) {
   sample.header = FromWire(wire.header());
   sample.plan = wire.plan();
   sample.event = wire.event();
+  sample.argument = wire.argument();
   sample.s_wanted_mm = wire.s_wanted_mm();
   sample.s_rate_mm_per_s = wire.s_rate_mm_per_s();
   sample.due_ns = wire.due_ns();
@@ -279,7 +293,8 @@ bool FromWire(const idl::main_motion::v1::ProcessRecord& wire, ProcessRecord& sa
   sample.deviation_mm = wire.deviation_mm();
   sample.peer_age_s = wire.peer_age_s();
   return Take(wire.action(), kActions, sample.action) &&
-         Finite({sample.s_wanted_mm, sample.s_rate_mm_per_s, sample.deviation_mm, sample.peer_age_s});
+         Finite({sample.argument, sample.s_wanted_mm, sample.s_rate_mm_per_s, sample.deviation_mm,
+                 sample.peer_age_s});
 }
 
 void ToWire(const ModuleCommand& sample, idl::cell::v1::Command& wire) {
@@ -352,6 +367,8 @@ void ToWire(const ProcessBatch& sample, idl::trajectory::v1::ProcessBatch& wire)
     gate.kind(Number(sample.gates[i].kind));
     gate.s_mm(sample.gates[i].s_mm);
     gate.argument(sample.gates[i].argument);
+    gate.input(Number(sample.gates[i].condition.input()));
+    gate.input_event(Number(sample.gates[i].condition.event()));
   }
   wire.event_count(sample.event_count);
   for (std::size_t i = 0; i < sample.event_count; ++i) {
@@ -380,7 +397,8 @@ bool FromWire(const idl::trajectory::v1::ProcessBatch& wire, ProcessBatch& sampl
     to.id = gate.id();
     to.s_mm = gate.s_mm();
     to.argument = gate.argument();
-    sound = Take(gate.kind(), kGateKinds, to.kind) && Finite({to.s_mm, to.argument}) && sound;
+    sound = Take(gate.kind(), kGateKinds, to.kind) && TakeCondition(gate, to.condition) &&
+            Finite({to.s_mm, to.argument}) && sound;
   }
   for (std::size_t i = 0; i < sample.event_count; ++i) {
     const idl::trajectory::v1::ProcessEvent& event = wire.events()[i];

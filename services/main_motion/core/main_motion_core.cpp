@@ -380,6 +380,7 @@ void MainMotionCore::RunGate() {
       }
       return;
     case GateKind::kStop:
+    case GateKind::kInput:
     case GateKind::kNone:
       return;  // the operator's
   }

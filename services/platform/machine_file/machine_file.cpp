@@ -122,6 +122,8 @@ void VisitGroup(Machine& machine, const std::string& group, Visit&& visit) {
     visit("jet_off_delay_s", machine.process.jet_off_delay_s);
     visit("abrasive_on_delay_s", machine.process.abrasive_on_delay_s);
     visit("abrasive_off_delay_s", machine.process.abrasive_off_delay_s);
+    visit("abrasive_flow_g_per_min", machine.process.abrasive_flow_g_per_min);
+    visit("abrasive_flow_max_g_per_min", machine.process.abrasive_flow_max_g_per_min);
     visit("measuring_settle_time_s", machine.process.measuring_settle_time_s);
   } else if (group == "uncertainties") {
     visit("straightness_mm", machine.uncertainties.straightness_mm);

@@ -69,6 +69,7 @@ PartProgram ReadListed(ListedProgram listed) {
   options.notation = made.notation;
   if (listed.machine != nullptr) {
     options.gcode.kerf_width_mm = listed.machine->process.kerf_width_mm;
+    options.gcode.abrasive_flow_max_g_per_min = listed.machine->process.abrasive_flow_max_g_per_min;
     options.gcode.default_tolerance_mm = listed.machine->path.corner_tolerance_mm;
   }
   return ReadPartProgram(made.text, options);

@@ -57,6 +57,8 @@ ReadOptions ReaderOptionsOf(const MachineDescription& machine, const PlanOptions
   options.compensate_kerf = true;
   options.gcode.default_tolerance_mm = machine.path.corner_tolerance_mm;
   options.gcode.kerf_width_mm = machine.process.kerf_width_mm;
+  options.gcode.abrasive_flow_max_g_per_min = 0.0;  // main motion does not obey them yet
+  options.gcode.process_inputs = false;
   options.gcode.fault_limit = options.cldata.fault_limit = kFaultLimit;
   return options;
 }
@@ -227,7 +229,8 @@ class Planner {
     }
     Plan& plan = result_.plan;
     const auto id = static_cast<std::uint32_t>(plan.gates.size() + 1);
-    plan.gates.push_back({id, element.gate, s_mm_, element.gate_argument, element.line});
+    plan.gates.push_back(
+        {id, element.gate, s_mm_, element.gate_argument, element.line, element.gate_condition});
     plan.segments.back().gate_at_end = id;
     if (element.gate == GateKind::kPierce) {
       Jet(s_mm_, true);

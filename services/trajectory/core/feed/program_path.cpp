@@ -64,6 +64,8 @@ class PathBuilder {
         return Gate(o, GateKind::kMeasure, o.value);
       case OperationKind::kStop:
         return Gate(o, GateKind::kStop, 0.0);
+      case OperationKind::kWaitInput:
+        return Gate(o, GateKind::kInput, o.value);
       case OperationKind::kJetOn:
         return Event(o, ProcessAction::kJetOn);
       case OperationKind::kJetOff:
@@ -76,6 +78,8 @@ class PathBuilder {
         return Event(o, ProcessAction::kCameraTrackOn);
       case OperationKind::kCameraTrackOff:
         return Event(o, ProcessAction::kCameraTrackOff);
+      case OperationKind::kAbrasiveFlow:
+        return Event(o, ProcessAction::kAbrasiveFlow);
       case OperationKind::kPathTolerance:
         exact_ = o.value == 0.0;
         tolerance_mm_ = exact_ ? std::min(kExactTolerance_mm, defaults_.tolerance_mm) : o.value;
@@ -161,6 +165,7 @@ class PathBuilder {
     PathElement& gate = Open(ElementKind::kGate, o.line);
     gate.gate = kind;
     gate.gate_argument = argument;
+    gate.gate_condition = o.condition;
     gate.from_mm = gate.to_mm = position_;
     moved_ = true;
   }

@@ -58,6 +58,7 @@ struct PathElement {
   std::vector<PathEvent> events;
   GateKind gate = GateKind::kNone;
   double gate_argument = 0.0;
+  InputCondition gate_condition;
   std::size_t number = 0;     // in the whole program's path
   double run_begin_mm = 0.0;  // run: length of all runs before it, from the program's start
 

@@ -205,15 +205,25 @@ bool SortCodes(Reading& r) {
 
 bool TakesP(int motion) { return motion == 20 || motion == 30 || motion == 50 || motion == 820; }
 
-// Which words of this line want a P; more than one would have to share it.
-bool OneTakesP(Reading& r) {
-  const int once = r.code(kOnce), machine = r.code(kMachineWord);
-  const int takers = (once == 40) + (once == 100) + (r.code(kJet) == 30 || r.code(kJet) == 40) +
-                     (r.code(kOutput) != kNoCode) + (machine == 1000 || machine == 1010) +
-                     (r.code(kPathMode) == 640) + (r.code(kCallWord) == 980) + TakesP(r.code(kMotion));
-  return takers < 2 || !r.block.has('P') ||
-         r.FaultAt('P', "P_AMBIGUOUS",
-                   "two words of this line could take this P; write them in lines of their own");
+bool NotShared(Reading& r, int takers, char letter, std::string_view reason) {
+  return takers < 2 || !r.block.has(letter) ||
+         r.FaultAt(letter, reason,
+                   std::string("two words of this line could take this ") + letter +
+                       "; write them in lines of their own");
+}
+
+// Which words of this line want a P, a Q or an L; more than one would have to share it.
+bool OneTakesEach(Reading& r) {
+  const int once = r.code(kOnce), machine = r.code(kMachineWord), output = r.code(kOutput);
+  const int motion = r.code(kMotion) != kNoCode || !r.HasAxisWords() ? r.code(kMotion) : r.state.motion;
+  const int path = r.code(kPathMode) == 640, call = r.code(kCallWord) == 980;
+  const int p = (once == 40) + (once == 100) + (r.code(kJet) == 30 || r.code(kJet) == 40) +
+                (output != kNoCode && output < 670) + (machine == 1000 || machine == 1010) + path + call +
+                TakesP(motion);
+  const int q = (output >= 660) + path + (motion == 50 || motion == 830);
+  const int l = (output == 660) + (once == 100) + call + (motion >= 810);
+  return NotShared(r, p, 'P', "P_AMBIGUOUS") && NotShared(r, q, 'Q', "Q_AMBIGUOUS") &&
+         NotShared(r, l, 'L', "L_AMBIGUOUS");
 }
 
 // What LinuxCNC refuses while compensation is on; G40 in the same line comes before what follows it in the order above.
@@ -327,15 +337,82 @@ bool Abrasive(Reading& r) {
   return true;
 }
 
+// M67 on the fly; M68 at once: where the motion before has ended.
+bool AnalogOutput(Reading& r, bool at_once) {
+  const double most = r.options.abrasive_flow_max_g_per_min;
+  if (!(most > 0.0)) {
+    return r.FaultAt(kOutput, "OUTPUT_UNKNOWN", "this machine has no analog outputs");
+  }
+  if (!r.block.has('E') || r.block.Take('E') != 0.0) {
+    return r.FaultAt(kOutput, "OUTPUT_UNKNOWN",
+                     "E0 is the flow of abrasive in g/min; there are no other analog outputs");
+  }
+  if (!r.block.has('Q')) {
+    return r.FaultAt(kOutput, "OUTPUT_VALUE_MISSING", "Q must give the flow of abrasive in g/min");
+  }
+  const double flow_g_per_min = r.block.Take('Q');
+  if (!(flow_g_per_min >= 0.0 && flow_g_per_min <= most)) {
+    return r.FaultAt('Q', "ABRASIVE_FLOW_OUT_OF_RANGE",
+                     "the flow of abrasive is 0 … " + ShortNumber(most) + " g/min on this machine");
+  }
+  if (at_once) {
+    r.Add(OperationKind::kDwell);
+  }
+  r.Add(OperationKind::kAbrasiveFlow).value = flow_g_per_min;
+  return true;
+}
+
+// A gate. What the input reads, mode 0, and how the wait ended, #5399, cannot be known: the program is planned whole before
+// the machine runs.
+bool WaitForInput(Reading& r) {
+  const char* inputs =
+      "M66 waits for P0, the pump at pressure, or P1, abrasive in the hopper; there are no others";
+  if (!r.options.process_inputs) {
+    return r.FaultAt(kOutput, "INPUT_UNKNOWN", "this machine has no inputs that a program could wait for");
+  }
+  if (r.block.has('P') && r.block.has('E')) {
+    return r.FaultAt(kOutput, "INPUT_AMBIGUOUS", "P or E names the input, not both");
+  }
+  const double p = r.block.has('P') ? r.block.Take('P') : -1.0;
+  if (p != 0.0 && p != 1.0) {
+    return r.FaultAt(kOutput, "INPUT_UNKNOWN", inputs);
+  }
+  const double l = r.block.has('L') ? r.block.Take('L') : 0.0;
+  if (l == 0.0) {
+    return r.FaultAt(
+        kOutput, "INPUT_READ_UNPLANNED",
+        "what an input reads is known when the machine runs, and a program is planned whole before; "
+        "wait for it with L1 … L4");
+  }
+  if (!(l >= 1.0 && l <= 4.0) || l != std::floor(l)) {
+    return r.FaultAt('L', "INPUT_EVENT_UNKNOWN",
+                     "L1 waits for a rise, L2 for a fall, L3 for high, L4 for low");
+  }
+  const double seconds = r.block.has('Q') ? r.block.Take('Q') : 0.0;
+  if (!(seconds > 0.0 && seconds <= kLongestDwell_s)) {
+    return r.FaultAt(r.block.has('Q') ? 'Q' : 'L', "INPUT_TIMEOUT_OUT_OF_RANGE",
+                     "Q, the longest wait, is more than 0 and at most 3600 s");
+  }
+  Operation& o = r.Add(OperationKind::kWaitInput);
+  o.value = seconds;
+  o.condition = InputCondition::Of(static_cast<ProcessInput>(static_cast<int>(p)),
+                                   static_cast<InputEvent>(static_cast<int>(l)));
+  r.state.waited_for_input = true;
+  return true;
+}
+
 bool Outputs(Reading& r) {
   const int m = r.code(kOutput);
   if (m == kNoCode) {
     return true;
   }
   if (m == 660) {
-    return r.FaultAt(kOutput, "INPUT_UNKNOWN", "this machine has no inputs that a program could wait for");
+    return WaitForInput(r);
   }
-  if (m >= 670 || !r.block.has('P') || (r.block.at('P') != 0.0 && r.block.at('P') != 1.0)) {
+  if (m >= 670) {
+    return AnalogOutput(r, m == 680);
+  }
+  if (!r.block.has('P') || (r.block.at('P') != 0.0 && r.block.at('P') != 1.0)) {
     return r.FaultAt(kOutput, "OUTPUT_UNKNOWN", "P0 is the jet, P1 the abrasive; there are no others");
   }
   const bool jet = r.block.Take('P') == 0.0;
@@ -633,7 +710,7 @@ void ObeyBlock(Reading& r) {
     ObeyStraight(r);
     return;
   }
-  const bool good = SortCodes(r) && OneTakesP(r) && KerfAllows(r) && TakeFeed(r) && Outputs(r) && Jet(r) &&
+  const bool good = SortCodes(r) && OneTakesEach(r) && KerfAllows(r) && TakeFeed(r) && Outputs(r) && Jet(r) &&
                     Abrasive(r) && MachineWords(r) && Dwell(r) && Plane(r) && Units(r) && Kerf(r) &&
                     PathMode(r) && DistanceModes(r) && ChangeOffsets(r) && GoToReference(r) &&
                     ObeyMotion(r) && Calls(r) && Stopping(r);

@@ -182,6 +182,12 @@ class ExpressionReader {
       return false;
     }
     if (name.empty()) {
+      if (parameters_.Unknowable(index)) {
+        return scan_.Fail(
+            "INPUT_RESULT_UNKNOWN", from,
+            "what M66 sees is known when the machine runs, and a program is planned whole before; the "
+            "machine holds by itself where the wait fails");
+      }
       value = parameters_.Numbered(index);
       return true;
     }
@@ -389,20 +395,22 @@ class ExpressionReader {
     return rest < 0.0 ? rest + std::abs(right) : rest;
   }
 
+  static bool Equal(double left, double right) { return std::abs(left - right) < kEqual; }
+
   static bool Holds(Operator op, double left, double right) {
     switch (op) {
       case Operator::kEq:
-        return std::abs(left - right) < kEqual;
+        return Equal(left, right);
       case Operator::kNe:
-        return std::abs(left - right) >= kEqual;
+        return !Equal(left, right);
       case Operator::kGt:
         return left > right;
       case Operator::kGe:
-        return left >= right;
+        return left >= right || Equal(left, right);
       case Operator::kLt:
         return left < right;
       case Operator::kLe:
-        return left <= right;
+        return left <= right || Equal(left, right);
       case Operator::kAnd:
         return left != 0.0 && right != 0.0;
       case Operator::kOr:

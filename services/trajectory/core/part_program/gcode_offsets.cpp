@@ -205,8 +205,12 @@ bool ChangeOffsets(Reading& r) {
   }
   if (r.code(kOffset) != kNoCode) {
     const int g = r.code(kOffset);
-    r.state.offset = static_cast<std::size_t>(g <= 590 ? (g - 540) / 10 : 5 + (g - 590));
-    r.state.origin = r.state.offsets[r.state.offset];
+    const auto offset = static_cast<std::size_t>(g <= 590 ? (g - 540) / 10 : 5 + (g - 590));
+    // Parameters that were set since it was selected count from when it is selected out of another.
+    if (offset != r.state.offset) {
+      r.state.origin = r.state.offsets[offset];
+    }
+    r.state.offset = offset;
     if (!AddOffsetChange(r)) {
       return false;
     }

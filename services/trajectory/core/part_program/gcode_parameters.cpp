@@ -40,6 +40,7 @@ void Parameters::Enter(const std::vector<double>& arguments) {
   Allocate();
   Frame& frame = frames_.emplace_back();
   std::copy_n(numbered_.begin() + 1, kArguments, frame.arguments.begin());
+  std::fill_n(numbered_.begin() + 1, kArguments, 0.0);
   std::copy(arguments.begin(), arguments.end(), numbered_.begin() + 1);
   frame.names.swap(names_);
   global_names_["_value"] = 0.0;

@@ -25,6 +25,8 @@ class StateParameters {
   virtual std::optional<double> Named(std::string_view name) const = 0;
   // False where the parameter is none of the state's.
   virtual bool SetNumbered(int index, double value) = 0;
+  // What only the machine will know, once the program runs.
+  virtual bool Unknowable(int index) const = 0;
 };
 
 class Parameters {
@@ -32,6 +34,7 @@ class Parameters {
   explicit Parameters(StateParameters& state) : state_(state) {}
 
   double Numbered(int index) const;
+  bool Unknowable(int index) const { return state_.Unknowable(index); }
   std::optional<double> Named(const std::string& name) const;  // in small letters, without spaces
 
   bool ReadOnly(const std::string& name) const { return state_.Named(name).has_value(); }
@@ -43,7 +46,7 @@ class Parameters {
   void Forget() { pending_.clear(); }
   void Settle();
 
-  // A subroutine has its own #1 … #30 (beyond its arguments: the caller's values) and its own names.
+  // A subroutine has its own #1 … #30 (beyond its arguments: 0) and its own names.
   void Enter(const std::vector<double>& arguments);
   // The value that it gave back, if it did.
   void Leave(std::optional<double> value);

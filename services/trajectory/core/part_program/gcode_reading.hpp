@@ -19,6 +19,7 @@ namespace lambdajet::trajectory {
 
 constexpr double kSecondsPerMinute = 60.0;
 constexpr int kNoCode = -1;
+constexpr int kInputResult = 5399;  // the parameter in which M66 leaves what it saw
 
 inline constexpr std::size_t kAxisCount = 6;  // X Y Z A B C
 inline constexpr std::size_t kLinearAxes = 3;
@@ -85,6 +86,7 @@ struct ModalState {
   bool kerf_ends = false;  // G40 stands before the next motion
   bool jet_on = false;
   bool abrasive_on = false;
+  bool waited_for_input = false;  // since #5399 was set
   CycleMemory cycle;
   std::optional<std::array<double, 2>>
       spline_end;  // from the last spline's end to its second control point, mm
@@ -118,6 +120,7 @@ class Reading : public StateParameters {
   std::optional<double> Numbered(int index) const override;
   std::optional<double> Named(std::string_view name) const override;
   bool SetNumbered(int index, double value) override;
+  bool Unknowable(int index) const override { return index == kInputResult && state.waited_for_input; }
 
   int code(Group group) const { return codes[group]; }
   bool drives(std::size_t axis) const { return (options.axes >> axis & 1u) != 0; }

@@ -140,6 +140,7 @@ bool Reading::SetNumbered(int index, double value) {
     }
     return true;
   };
+  state.waited_for_input = state.waited_for_input && index != kInputResult;
   if (within(5161, 5169)) {
     return set(state.home_28, 5161);
   }

@@ -6,19 +6,21 @@
 namespace lambdajet::trajectory {
 namespace {
 
-constexpr std::array<std::string_view, 23> kNames = {"TRAVERSE",
+constexpr std::array<std::string_view, 25> kNames = {"TRAVERSE",
                                                      "FEED_LINE",
                                                      "FEED_ARC",
                                                      "DWELL",
                                                      "PIERCE",
                                                      "MEASURE",
                                                      "STOP",
+                                                     "WAIT_INPUT",
                                                      "JET_ON",
                                                      "JET_OFF",
                                                      "ABRASIVE_ON",
                                                      "ABRASIVE_OFF",
                                                      "CAMERA_TRACK_ON",
                                                      "CAMERA_TRACK_OFF",
+                                                     "ABRASIVE_FLOW",
                                                      "FEED_CHANGE",
                                                      "UNITS_CHANGE",
                                                      "DISTANCE_CHANGE",
@@ -67,6 +69,13 @@ void AppendFeed(std::string& text, const Operation& o) {
   }
 }
 
+void AppendCondition(std::string& text, InputCondition condition) {
+  static constexpr std::array<const char*, kProcessInputs> kInputs = {"pump_at_pressure", "abrasive_present"};
+  static constexpr std::array<const char*, 5> kEvents = {"none", "rise", "fall", "high", "low"};
+  text += std::string(" input=") + kInputs[static_cast<std::size_t>(condition.input())] +
+          " event=" + kEvents[static_cast<std::size_t>(condition.event())];
+}
+
 void AppendKerf(std::string& text, const Operation& o) {
   if (o.kerf_offset_mm != 0.0) {
     Append(text, "kerf_offset_mm", o.kerf_offset_mm);
@@ -105,6 +114,13 @@ std::string FormatOperation(const Operation& o) {
     case OperationKind::kDwell:
     case OperationKind::kPierce:
       Append(text, "time_s", o.value);
+      break;
+    case OperationKind::kWaitInput:
+      AppendCondition(text, o.condition);
+      Append(text, "timeout_s", o.value);
+      break;
+    case OperationKind::kAbrasiveFlow:
+      Append(text, "flow_g_per_min", o.value);
       break;
     case OperationKind::kMeasure:
     case OperationKind::kCameraTrackOn:

@@ -11,22 +11,26 @@
 #include <string_view>
 #include <vector>
 
+#include "foundation/motion/plan.hpp"
+
 namespace lambdajet::trajectory {
 
 enum class OperationKind : std::uint8_t {
   kTraverse,  // jet-off move, its shape is the planner's
   kFeedLine,
   kFeedArc,
-  kDwell,    // value: s
-  kPierce,   // value: s, 0: the machine's own pierce time; jet and abrasive on at its end
-  kMeasure,  // value: id of the mark
-  kStop,     // M0, M1: until the operator goes on
-  kJetOn,    // from here to kCameraTrackOff: on the fly, keyed to path length
+  kDwell,      // value: s
+  kPierce,     // value: s, 0: the machine's own pierce time; jet and abrasive on at its end
+  kMeasure,    // value: id of the mark
+  kStop,       // M0, M1: until the operator goes on
+  kWaitInput,  // until `condition` holds; value: s, at most
+  kJetOn,      // from here to kAbrasiveFlow: on the fly, keyed to path length
   kJetOff,
   kAbrasiveOn,
   kAbrasiveOff,
   kCameraTrackOn,  // value: id of the mark
   kCameraTrackOff,
+  kAbrasiveFlow,      // value: g/min
   kFeedChange,        // feed_mm_per_s
   kUnitsChange,       // value: mm a unit
   kDistanceChange,    // value: 90 or 91
@@ -65,8 +69,9 @@ struct Operation {
   OperationKind kind = OperationKind::kEnd;
   ArcPlane plane = ArcPlane::kXy;  // arc
   std::uint8_t axes = kPlanarAxes;
-  std::uint32_t line = 0;  // of the program, 1 is the first
-  double x_W_mm = 0.0;     // end of a motion
+  InputCondition condition;  // wait for an input
+  std::uint32_t line = 0;    // of the program, 1 is the first
+  double x_W_mm = 0.0;       // end of a motion
   double y_W_mm = 0.0;
   double z_W_mm = 0.0;
   double a_rad = 0.0;  // end of a motion: the programmed rotary words, about X, Y, Z

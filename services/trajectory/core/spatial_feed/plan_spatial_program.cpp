@@ -149,7 +149,7 @@ class ProgramPlanner {
       out_.plan.duration_s += rest.duration_s;
     }
     const auto id = static_cast<std::uint32_t>(out_.plan.gates.size() + 1);
-    out_.plan.gates.push_back({id, run.gate, s_mm_, run.gate_argument, run.gate_line});
+    out_.plan.gates.push_back({id, run.gate, s_mm_, run.gate_argument, run.gate_line, {}});
     out_.plan.segments.back().gate_at_end = id;
     if (run.gate == GateKind::kDwell) {
       out_.gate_time_s += run.gate_argument;

@@ -58,6 +58,8 @@ PartProgram ReadSpatialProgram(std::string_view text, const HexapodMotion& motio
   options.gcode.axes = options.cldata.axes = kSixAxes;
   options.gcode.default_tolerance_mm = motion.corner_tolerance_mm;
   options.gcode.kerf_compensation = false;
+  options.gcode.abrasive_flow_max_g_per_min = 0.0;  // a hexapod's own players have neither
+  options.gcode.process_inputs = false;
   options.cldata.tool_angles = ToolAngles::kRollPitch;
   options.cldata.spindle = {motion.spindle_least_per_min, motion.spindle_most_per_min};
   PartProgram program = ReadPartProgram(text, options);

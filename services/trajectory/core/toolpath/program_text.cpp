@@ -246,6 +246,11 @@ class OperationWriter {
         return "M101 P" + Number(o.value);
       case OperationKind::kCameraTrackOff:
         return "M102";
+      case OperationKind::kAbrasiveFlow:
+        return "M67 E0 Q" + Number(o.value);
+      case OperationKind::kWaitInput:
+        return "M66 P" + std::to_string(static_cast<int>(o.condition.input())) + " L" +
+               std::to_string(static_cast<int>(o.condition.event())) + " Q" + Number(o.value);
       default:
         return "M2";
     }

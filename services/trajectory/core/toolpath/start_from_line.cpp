@@ -26,6 +26,9 @@ void Obey(const Operation& o, ModalState& state) {
     case OperationKind::kAbrasiveOff:
       state.abrasive_on = o.kind == OperationKind::kAbrasiveOn;
       break;
+    case OperationKind::kAbrasiveFlow:
+      state.abrasive_flow_g_per_min = o.value;
+      break;
     case OperationKind::kCameraTrackOn:
       state.camera_mark_value = o.value;
       break;
@@ -85,6 +88,9 @@ class StateWriter {
  private:
   // The jet has gone: the sheet is pierced again where it stood.
   void Valves() {
+    if (state_.abrasive_flow_g_per_min >= 0.0) {
+      Add(OperationKind::kAbrasiveFlow).value = state_.abrasive_flow_g_per_min;
+    }
     if (state_.jet_on) {
       Add(OperationKind::kPierce);
       if (!state_.abrasive_on) {

@@ -23,8 +23,9 @@ struct ModalState {
   double work_offset_g_value = 54.0;
   double work_offset_x_mm = 0.0;
   double work_offset_y_mm = 0.0;
-  double path_tolerance_mm = -1.0;  // below 0: the program has not said
-  double camera_mark_value = -1.0;  // followed; below 0: none
+  double path_tolerance_mm = -1.0;        // below 0: the program has not said
+  double camera_mark_value = -1.0;        // followed; below 0: none
+  double abrasive_flow_g_per_min = -1.0;  // below 0: the program has not said
   bool jet_on = false;
   bool abrasive_on = false;
   bool ended = false;
