@@ -333,9 +333,9 @@ class Prediction {
     ASSERT_TRUE(run.complete) << Name(cell.drive().reason) << " " << Name(cell.main_motion().reason);
     const double predicted_s = planned.plan.duration_s + planned.gate_time_s;
     const double off = run.duration_s / predicted_s - 1.0;
-    std::printf("%s%s: predicted %.3f s, simulated %.3f s, %+.3f %%, %zu gates\n", name.c_str(),
+    std::printf("%s%s: predicted %.3f s, simulated %.3f s, %+.3f %%, %u pierces of %zu gates\n", name.c_str(),
                 options.compensate ? ", compensated" : "", predicted_s, run.duration_s, 100 * off,
-                planned.plan.gates.size());
+                planned.pierce_count, planned.plan.gates.size());
     EXPECT_LE(std::abs(off), 0.01);
     worst_ = std::max(worst_, std::abs(off));
   }

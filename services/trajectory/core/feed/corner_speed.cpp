@@ -48,6 +48,9 @@ CornerRule::CornerRule(const SmoothingFilter& filter, double kink_deviation_s, d
 
 CornerRule::Crossing CornerRule::Cross(double angle_rad, double deviation_mm, double feed_mm_per_s) const {
   const double change = 2.0 * std::sin(0.5 * angle_rad);
+  if (feed_mm_per_s <= kLeastSpeed_mm_per_s) {
+    return {feed_mm_per_s, 0.0, false};
+  }
   Crossing best{kLeastSpeed_mm_per_s, reach_s_ * kLeastSpeed_mm_per_s, true};
   double least = 1e300;
   for (std::size_t h = 0; h < kHolds; ++h) {

@@ -239,16 +239,22 @@ class Planner {
     result_.gate_time_s += GateTime(element);
   }
 
+  // What a gate costs besides its own time: the drive sees that it stands and starts again a control period late each; where
+  // main motion opens the gate, states go to it and back besides, one every 2 and 4 ms.
+  static constexpr double kStoppedAndStarted_s = 0.002;
+  static constexpr double kAskedAcrossTheLink_s = 0.0085;
+
   double GateTime(const PathElement& gate) const {
     switch (gate.gate) {
       case GateKind::kPierce: {  // counted from when water and abrasive are there
         const ProcessModel& process = model_.machine.process;
-        return gate.gate_argument + std::max(process.jet_on_delay_s, process.abrasive_on_delay_s);
+        return gate.gate_argument + std::max(process.jet_on_delay_s, process.abrasive_on_delay_s) +
+               kAskedAcrossTheLink_s;
       }
       case GateKind::kDwell:
-        return gate.gate_argument;
+        return gate.gate_argument + kStoppedAndStarted_s;
       case GateKind::kMeasure:
-        return model_.machine.process.measuring_settle_time_s;
+        return model_.machine.process.measuring_settle_time_s + kAskedAcrossTheLink_s;
       default:
         return 0.0;
     }

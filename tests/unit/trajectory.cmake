@@ -1,0 +1,1 @@
+lambdajet_check(unit_trajectory_feed LABELS unit SOURCES trajectory_feed_test.cpp DEPS trajectory_core)
