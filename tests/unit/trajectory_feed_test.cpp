@@ -288,8 +288,8 @@ TEST(FeedMoment, TakesTheLimitThatIsNearestToBeingReached) {
   EXPECT_EQ(moment.limit, FeedLimit::kPathJerk);
   moment.Offer(FeedLimit::kCurvature, 0.4);
   EXPECT_EQ(moment.limit, FeedLimit::kPathJerk);
-  // A corner counts as reached at 0.95 of its tolerance: at 0.94 it is nearer than a jerk at 0.97.
-  moment.Offer(FeedLimit::kPathJerk, 0.97);
+  moment.Offer(FeedLimit::kCorner, 0.5);
+  EXPECT_EQ(moment.limit, FeedLimit::kPathJerk) << "as near: the first";
   moment.Offer(FeedLimit::kCorner, 0.94);
   EXPECT_EQ(moment.limit, FeedLimit::kCorner);
   EXPECT_EQ(moment.reached_share, 0.94);
@@ -301,7 +301,7 @@ std::vector<FeedMoment> RandomMoments(FeedDice& dice, int count) {
   for (int i = 0; i < count; ++i) {
     if (i == 0 || dice.Below(4) == 0) {
       m.limit = kSome[dice.Below(4)];
-      m.reached_share = dice.Below(2) == 0 ? ReachedFrom(m.limit) : dice.Between(0.2, 0.94);
+      m.reached_share = dice.Below(2) == 0 ? kLimitReached : dice.Between(0.2, 0.89);
     }
     m.s_mm += dice.Between(0.0, 0.5);
     m.speed_mm_per_s = dice.Between(1.0, 90.0);
@@ -340,7 +340,7 @@ TEST(BindingReport, StretchesFollowOneAnotherAndTellWhatHappenedInThem) {
       }
       ASSERT_LE(s.lowest_mm_per_s, lowest);
       ASSERT_GE(s.reached_share, share);
-      ASSERT_EQ(s.limit == FeedLimit::kSmoothing, s.reached_share < ReachedFrom(s.nearest));
+      ASSERT_EQ(s.limit == FeedLimit::kSmoothing, s.reached_share < kLimitReached);
       ASSERT_GE(s.share, 0.0);
       ASSERT_LE(s.share, 1.0 + 1e-12);
       ASSERT_LE(s.from_s_mm, s.at_s_mm);
@@ -355,10 +355,10 @@ TEST(BindingReport, LimitingCases) {
   nothing.Close(1.0);
   EXPECT_TRUE(slow.empty());
 
-  // Curvature, five moments of smoothing, jerk: a gap of as many moments as a change takes is shared between the two.
-  const auto told = [](std::size_t change_moments) {
+  // Curvature, five moments of smoothing, jerk: each is tied to the nearer one, and the middle one only as far as the smoothing reaches.
+  const auto told = [](std::size_t reach_moments) {
     std::vector<SlowStretch> all;
-    BindingReport report(change_moments, all);
+    BindingReport report(reach_moments, all);
     for (int i = 0; i < 15; ++i) {
       FeedMoment m{
           static_cast<double>(i), 50.0, 100.0, 7, i < 5 ? FeedLimit::kCurvature : FeedLimit::kPathJerk, 1.0};
@@ -368,18 +368,18 @@ TEST(BindingReport, LimitingCases) {
     report.Close(15.0);
     return all;
   };
-  const std::vector<SlowStretch> shared = told(5), apart = told(4);
-  ASSERT_EQ(shared.size(), 2u);
-  EXPECT_EQ(shared[0].limit, FeedLimit::kCurvature);
-  EXPECT_EQ(shared[0].to_s_mm, 7.0);
-  EXPECT_NEAR(shared[0].share, 5.0 / 7.0, 1e-12);
-  EXPECT_EQ(shared[1].limit, FeedLimit::kPathJerk);
+  const std::vector<SlowStretch> tied = told(3), apart = told(2);
+  ASSERT_EQ(tied.size(), 2u);
+  EXPECT_EQ(tied[0].limit, FeedLimit::kCurvature);
+  EXPECT_EQ(tied[0].to_s_mm, 8.0);
+  EXPECT_NEAR(tied[0].share, 5.0 / 8.0, 1e-12);
+  EXPECT_EQ(tied[1].limit, FeedLimit::kPathJerk);
   ASSERT_EQ(apart.size(), 3u);
   EXPECT_EQ(apart[1].limit, FeedLimit::kSmoothing);
   EXPECT_EQ(apart[1].nearest, FeedLimit::kPathJerk);
   EXPECT_EQ(apart[1].reached_share, 0.6);
-  EXPECT_EQ(apart[1].from_s_mm, 5.0);
-  EXPECT_EQ(apart[1].to_s_mm, 10.0);
+  EXPECT_EQ(apart[1].from_s_mm, 7.0);
+  EXPECT_EQ(apart[1].to_s_mm, 8.0);
 }
 
 }  // namespace
