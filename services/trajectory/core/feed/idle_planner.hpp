@@ -6,11 +6,26 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <optional>
+#include <string_view>
 
-#include "trajectory/core/feed/stretch.hpp"
+#include "trajectory/core/feed/planning_model.hpp"
+#include "trajectory/core/idle_motion/idle_law.hpp"
 
 namespace lambdajet::trajectory {
+
+struct IdleMove {
+  bool straight = true;  // trapezoid along the line; else one law a coordinate
+  double duration_s = 0.0;
+  double speed_mm_per_s = 0.0;  // trapezoid: cruise
+  double ramp_s = 0.0;
+  std::array<IdleLaw, 2> laws;
+  std::string_view name;
+  std::string_view reason;
+  double start_speed_mm_per_s = 0.0;
+  double peak_acceleration_mm_per_s2 = 0.0;
+};
 
 // `slow` in (0, 1] scales speed and, squared, acceleration. Nothing if no law stays within reach.
 std::optional<IdleMove> PlanIdleMove(const PlanningModel& model, const Eigen::Vector2d& from_mm,

@@ -9,7 +9,7 @@
 
 #include <vector>
 
-#include "trajectory/core/feed/stretch.hpp"
+#include "trajectory/core/feed/planning_model.hpp"
 
 namespace lambdajet::trajectory {
 

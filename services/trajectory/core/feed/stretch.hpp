@@ -8,44 +8,10 @@
 #include <span>
 #include <vector>
 
-#include "trajectory/core/feed/corner_speed.hpp"
-#include "trajectory/core/feed/plan_program.hpp"
+#include "trajectory/core/feed/planning_model.hpp"
 #include "trajectory/core/feed/program_path.hpp"
-#include "trajectory/core/feed/sheet_motion.hpp"
-#include "trajectory/core/feed/smoothing.hpp"
-#include "trajectory/core/feed/speed_profile.hpp"
-#include "trajectory/core/idle_motion/idle_law.hpp"
 
 namespace lambdajet::trajectory {
-
-// What every stretch of a program is planned with.
-struct PlanningModel {
-  explicit PlanningModel(const MachineDescription& machine, const PlanOptions& options);
-
-  const MachineDescription& machine;
-  const PlanOptions& options;
-  SheetMotion sheet;
-  SmoothingFilter filter;
-  double overshoot = 1.0;         // of the filter, on normal acceleration
-  double kink_deviation_s = 0.0;  // of the filter
-  double path_acceleration_mm_per_s2 = 0.0;
-  CornerRule corner;
-  ActuatorBounds bounds;        // with planning margin
-  double elastic_lag_s2 = 0.0;  // 0: not compensated
-  double damping_time_s = 0.0;
-};
-
-struct IdleMove {
-  bool straight = true;  // trapezoid along the line; else one law a coordinate
-  double duration_s = 0.0;
-  double speed_mm_per_s = 0.0;  // trapezoid: cruise
-  double ramp_s = 0.0;
-  std::array<IdleLaw, 2> laws;
-  std::string_view name;
-  std::string_view reason;
-  double start_speed_mm_per_s = 0.0;
-  double peak_acceleration_mm_per_s2 = 0.0;
-};
 
 // Where the elements of a planned stretch lie in path length and how they were limited.
 struct ElementPlace {
