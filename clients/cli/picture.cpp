@@ -177,7 +177,7 @@ void PlotFrame::DrawAxes(const std::string& title) {
                  {place_.left_px, place_.top_px}},
                 kGrey, 0.8);
   picture_.Text(place_.left_px + 0.5 * place_.width_px, bottom + 32, x_.label, 12, kInk, TextAnchor::kMiddle);
-  picture_.Text(place_.left_px - 44, place_.top_px + 0.5 * place_.height_px, y_.label, 12, kInk,
+  picture_.Text(place_.left_px - 54, place_.top_px + 0.5 * place_.height_px, y_.label, 12, kInk,
                 TextAnchor::kMiddle, -M_PI / 2);
   picture_.Text(place_.left_px, place_.top_px - 9, title, 13.5);
 }

@@ -53,6 +53,10 @@ absl::Status Canon(const ProgramVerb& verb, Output& output) {
   reading.gcode.axes = reading.cldata.axes =
       verb.axes == "xy" ? trajectory::kPlanarAxes : trajectory::kSixAxes;
   reading.cldata.tool_angles = trajectory::ToolAngles::kRollPitch;
+  if (reading.gcode.kerf_width_mm <= 0.0) {  // not told: the machine's, as it would be cut
+    const auto machine = ReadMachineFile(verb.machine);
+    reading.gcode.kerf_width_mm = machine.ok() ? machine->process.kerf_width_mm : 0.0;
+  }
   const trajectory::PartProgram program = trajectory::ReadPartProgram(*text, reading);
   if (!program.faults.empty()) {
     TellFaults(verb.program, program.faults, output);
@@ -319,7 +323,9 @@ void AddTrajectoryVerbs(CLI::App& noun, Output& output) {
       ->capture_default_str();
   canon_app->add_flag("--leave-out-z", canon->reading.leave_out_z,
                       "with xy: Z words of a flat program are read over, not refused");
-  canon_app->add_option("--kerf-width-mm", canon->reading.kerf_width_mm, "for G41 and G42 without a width");
+  canon_app->add_option("--kerf-width-mm", canon->reading.kerf_width_mm,
+                        "for G41 and G42 without a width; default: the machine's");
+  canon_app->add_option("--machine", canon->machine, "YAML file of the machine")->capture_default_str();
   const auto check = std::make_shared<ProgramVerb>();
   CLI::App* check_app =
       AddProgramVerb(noun, output, "check", "whether a program can be cut; exit code 4 if not", check, Check);

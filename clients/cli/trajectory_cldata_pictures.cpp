@@ -84,10 +84,12 @@ absl::Status DrawVerification(const ProgramVerification& v, const std::string& p
   for (std::size_t k = 0; k < v.series.size(); ++k) {
     const auto& s = v.series[k];
     const std::array<const std::vector<double>*, 3> rows = {&s.values, &s.first, &s.second};
+    const std::string unit = s.name.substr(s.name.rfind(' ') + 1), by = turn ? "rad" : "mm";
     const std::array<std::string, 3> titles = {
         s.name,
-        "first derivative by " + std::string(turn ? "C, 1/rad" : "path") + ": peak " + Fixed(s.peak_first, 4),
-        "second derivative: peak " + Fixed(s.peak_second, 4)};
+        std::string("first derivative by ") + (turn ? "C" : "path") + ", " + unit + "/" + by + ": peak " +
+            Fixed(s.peak_first, 4),
+        "second derivative, " + unit + "/" + by + "²: peak " + Fixed(s.peak_second, 4)};
     for (std::size_t row = 0; row < 3; ++row) {
       const auto [low, high] = RangeOf(*rows[row]);
       PlotFrame frame(picture,

@@ -242,7 +242,15 @@ void DrawPathFrame(Picture& picture, PlotFrame::Place place, const PlannedSpatia
   DrawPlane(frame, p);
   DrawTool(frame, p, kTool_mm);
   DrawPath(frame, p, by_speed, fastest);
-  if (!by_speed) {
+  if (by_speed) {
+    std::vector<std::pair<std::string, Colour>> legend;
+    for (const double share : {1.0, 0.75, 0.5, 0.25, 0.0}) {
+      legend.emplace_back(fmt::format("{:.0f} mm/s", share * fastest), Ramp(share));
+    }
+    legend.emplace_back("thin: no cut", Ramp(0.5).Faded(0.35));
+    legend.emplace_back("tool, 25 mm", kGrey.Faded(0.5));
+    frame.Legend(legend, true);
+  } else {
     frame.Legend({{"feed or rapid held", kGreen},
                   {"corner or tolerance", kRed},
                   {"curvature", kOrange},

@@ -297,6 +297,22 @@ void Feed() {
   FeedHeld("figure-eight", "feed.eight_share", FigureEight(20000, 20, 0.02, 6000), {{420, 300}, {380, 300}});
 }
 
+// Ten million lines, as a file of some 230 MB holds them.
+void LongFile() {
+  constexpr int kLines = 10'000'000;
+  const std::string text = CircleOfShortBlocks(kLines, 20, 0.02, 6000);
+  const double before_mib = PeakMemoryMib();
+  const Stopwatch reading;
+  const PartProgram program = ReadGcode(text, {});
+  std::printf(
+      "read %d lines, %.0f MB: %.2f s, %zu operations, %zu faults, %.0f MiB besides the text's %.0f\n",
+      kLines, 1e-6 * static_cast<double>(text.size()), reading.wall_s(), program.operations.size(),
+      program.faults.size(), PeakMemoryMib() - before_mib, before_mib);
+  PrintFigure("long.lines_read", program.faults.empty() ? kLines : 0);
+  PrintFigure("long.seconds", reading.wall_s());
+  PrintFigure("long.memory_mib", PeakMemoryMib());
+}
+
 void AllPlanning() {
   for (const int blocks :
        {100'000, 300'000, 1'000'000}) {  // growing, for the peak of memory is the process's
@@ -304,9 +320,9 @@ void AllPlanning() {
   }
 }
 
-constexpr Part kParts[] = {{"move", Moves},      {"read", [] { Reading(); }}, {"timing", Timing},
-                           {"feed", Feed},       {"bound", AgainstBound},     {"elastic", FeedForward},
-                           {"plan", AllPlanning}};
+constexpr Part kParts[] = {{"move", Moves},       {"read", [] { Reading(); }}, {"timing", Timing},
+                           {"feed", Feed},        {"bound", AgainstBound},     {"elastic", FeedForward},
+                           {"plan", AllPlanning}, {"long", LongFile}};
 
 bool Run(std::string_view word) {
   if (const int blocks = std::atoi(word.data()); blocks > 0) {
@@ -334,7 +350,8 @@ int main(int count, char** words) {
   }
   for (int i = 1; i < count; ++i) {
     if (!Run(words[i])) {
-      std::fprintf(stderr, "%s: not a number of blocks, nor move, read, timing, feed, bound, elastic, plan\n",
+      std::fprintf(stderr,
+                   "%s: not a number of blocks, nor move, read, timing, feed, bound, elastic, plan, long\n",
                    words[i]);
       return 2;
     }

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "tests/laws/trajectory_cases.hpp"
+#include "tests/support/figure.hpp"
 #include "trajectory/core/feed/plan_program.hpp"
 #include "trajectory/core/part_program/cldata_reader.hpp"
 
@@ -57,6 +58,7 @@ TEST(WrongCldata, IsRefusedWithReasonLineAndColumn) {
     ++count;
   }
   EXPECT_GE(count, 110);
+  tests::PrintFigure("wrong.cldata", count);
 }
 
 TEST(WrongCldata, StopsAtTheLimitOfFaults) {

@@ -309,7 +309,7 @@ TEST(RightPrograms, LeaveOutZWhenTold) {
   EXPECT_EQ(motions, 2u);
 }
 
-// Ten million lines are read; one operation too many is refused.
+// Many lines are read (ten million by `benchmark_trajectory long`); one operation too many is refused.
 TEST(RightPrograms, MayBeLong) {
   std::string text = "G1 F600\n";
   for (int i = 0; i < 300'000; ++i) {

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "tests/support/demo_machine.hpp"
+#include "tests/support/figure.hpp"
 #include "trajectory/core/feed/plan_program.hpp"
 #include "trajectory/core/toolpath/program_text.hpp"
 #include "trajectory/drawing/dxf_file.hpp"
@@ -72,6 +73,7 @@ TEST(WrongDrawings, AreRefusedWithTheirReason) {
     ++count;
   }
   EXPECT_GE(count, 85);
+  tests::PrintFigure("wrong.drawings", count);
 }
 
 TEST(WrongDrawings, TooManyVerticesAndNumbersAreRefusedBeforeTheLibrarySeesThem) {

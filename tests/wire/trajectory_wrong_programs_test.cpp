@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "tests/laws/trajectory_cases.hpp"
+#include "tests/support/figure.hpp"
 #include "trajectory/core/feed/plan_program.hpp"
 #include "trajectory/core/part_program/gcode_reader.hpp"
 
@@ -76,6 +77,7 @@ TEST(WrongPrograms, AreRefusedWithReasonLineAndColumn) {
     EXPECT_EQ(faults.front().column, e.column);
     EXPECT_FALSE(faults.front().message.empty());
   }
+  tests::PrintFigure("wrong.gcode", static_cast<double>(expectations.size()));
 }
 
 TEST(WrongPrograms, StopAtTheLimitOfFaults) {
