@@ -11,6 +11,7 @@
 #include "tests/laws/trajectory_spatial_reference.hpp"
 #include "trajectory/core/part_program/cldata_writer.hpp"
 #include "trajectory/core/spatial_feed/play_spatial_plan.hpp"
+#include "trajectory/core/toolpath/program_text.hpp"
 
 namespace lambdajet::trajectory {
 namespace {
@@ -385,9 +386,9 @@ TEST(DrillingCycle, FeedsAlongTheTiltedAxisAndDwellsAtItsBottom) {
 
 HexapodModel WorkedModel() { return {"worked", "0123456789ab", WorkedHexapod(), WorkedMotion()}; }
 
-std::string ShippedHoles() {
+std::string ShippedHoles(const char* notation = "ngc") {
   const char* folder = std::getenv("LAMBDAJET_SOURCE_DIR");
-  std::ifstream file(std::string(folder) + "/deploy/parts/tilted_holes/tilted_holes.ngc");
+  std::ifstream file(std::string(folder) + "/deploy/parts/tilted_holes/tilted_holes." + notation);
   return {std::istreambuf_iterator<char>(file), {}};
 }
 
@@ -399,7 +400,7 @@ TEST(DrillingCycle, OfTheShippedProgramFollowTheToolsTilt) {
   for (std::size_t i = 1; i < program.operations.size(); ++i) {
     const Operation& above = program.operations[i - 1];
     const Operation& at = program.operations[i];
-    if (at.kind != OperationKind::kFeedLine || above.kind != OperationKind::kTraverse || at.line > 28) {
+    if (at.kind != OperationKind::kFeedLine || above.kind != OperationKind::kTraverse || at.line > 29) {
       continue;
     }
     const Vector3d way(at.x_W_mm - above.x_W_mm, at.y_W_mm - above.y_W_mm, at.z_W_mm - above.z_W_mm);
@@ -449,6 +450,73 @@ TEST(SpatialCldata, GivesThePlanOfTheSameProgramInGcode) {
   std::printf("and random ones: struts apart %.1e mm, durations %.1e\n", worst_mm, worst_ratio);
   EXPECT_LE(worst_mm, 1e-5);
   EXPECT_LE(worst_ratio, 5e-3);  // rounding may be a pass more or less
+}
+
+// The shipped holes as a CAM system writes them: CYCLE with MULTAX, the spindle and its coolant.
+TEST(SpatialCldata, ItsCyclesGiveThePlanOfTheSameHolesInGcode) {
+  const PartProgram gcode = ReadSpatialProgram(ShippedHoles(), WorkedMotion());
+  const PartProgram cldata = ReadSpatialProgram(ShippedHoles("cldata"), WorkedMotion());
+  ASSERT_TRUE(gcode.faults.empty() && cldata.faults.empty());
+  const PlannedSpatialProgram a = PlanOf(gcode.operations), b = PlanOf(cldata.operations);
+  ASSERT_TRUE(a.faults.empty() && b.faults.empty()) << FaultText(a) << FaultText(b);
+  EXPECT_NEAR(a.plan.length_mm, b.plan.length_mm, 1e-5);
+  EXPECT_NEAR(a.gate_time_s, b.gate_time_s, 1e-12);
+  std::printf("holes as G-code and as CYCLE: %.6f and %.6f s, %.6f and %.6f mm\n", a.plan.duration_s,
+              b.plan.duration_s, a.plan.length_mm, b.plan.length_mm);
+  EXPECT_NEAR(a.plan.duration_s / b.plan.duration_s, 1.0,
+              1e-3);  // nine digits of an axis may be a pass more or less
+  ASSERT_EQ(a.plan.events.size(), b.plan.events.size());
+  for (std::size_t i = 0; i < a.plan.events.size(); ++i) {
+    EXPECT_EQ(a.plan.events[i].action, b.plan.events[i].action);
+    EXPECT_EQ(a.plan.events[i].argument, b.plan.events[i].argument);
+    EXPECT_NEAR(a.plan.events[i].s_mm, b.plan.events[i].s_mm, 1e-5);
+  }
+}
+
+// The machine stands still while the spindle runs up, for its share of the description's time; nobody waits for its stop.
+TEST(SpatialSpindle, IsWaitedForWhereItsSpeedChanges) {
+  const std::string text =
+      "S6000 M3\nG0 X0 Y0 Z20\nM8\nG1 X10 F600\nS12000\nG1 X20\nM4 S3000\nM9\nG1 X30\nM5\nG1 X40\nM2\n";
+  const PartProgram program = ReadSpatialProgram(text, WorkedMotion());
+  ASSERT_TRUE(program.faults.empty()) << program.faults[0].message;
+  const PlannedSpatialProgram planned = PlanOf(program.operations);
+  ASSERT_TRUE(planned.faults.empty()) << FaultText(planned);
+  std::vector<double> waits, gate_mm, said;
+  for (const Gate& gate : planned.plan.gates) {
+    EXPECT_EQ(gate.kind, GateKind::kDwell);
+    waits.push_back(gate.argument);
+    gate_mm.push_back(gate.s_mm);
+  }
+  for (const SpatialProcessEvent& event : planned.plan.events) {
+    said.push_back(event.action == SpatialAction::kSpindle     ? event.argument
+                   : event.action == SpatialAction::kCoolantOn ? 1.0
+                                                               : -1.0);
+  }
+  EXPECT_THAT(waits, testing::Pointwise(testing::DoubleNear(1e-12), {0.75, 0.75, 1.875, 0.0}));
+  EXPECT_THAT(gate_mm, testing::Pointwise(testing::DoubleNear(1e-9), {0.0, 10.0, 20.0, 30.0}));
+  EXPECT_THAT(said,
+              testing::Pointwise(testing::DoubleNear(1e-12), {6000.0, 1.0, 12000.0, -3000.0, -1.0, 0.0}));
+  EXPECT_NEAR(planned.gate_time_s, 3.375, 1e-12);
+  // Written out in both notations it is the same program.
+  const std::optional<std::string> gcode = OperationsText(program.operations, "spindle");
+  ASSERT_TRUE(gcode.has_value());
+  const CldataText cldata = WriteCldata(program.operations, "spindle", {}, ToolAngles::kRollPitch);
+  for (const std::string& written : {*gcode, cldata.text}) {
+    const PartProgram again = ReadSpatialProgram(written, WorkedMotion());
+    ASSERT_TRUE(again.faults.empty()) << written << again.faults[0].message;
+    const PlannedSpatialProgram same = PlanOf(again.operations);
+    EXPECT_EQ(same.gate_time_s, planned.gate_time_s) << written;
+    EXPECT_EQ(same.plan.events.size(), planned.plan.events.size());
+    EXPECT_NEAR(same.plan.duration_s, planned.plan.duration_s, 1e-9);
+  }
+  HexapodMotion without = WorkedMotion();
+  without.spindle_most_per_min = 0.0;
+  EXPECT_EQ(ReadSpatialProgram(text, without).faults.at(0).reason, "SPINDLE_MISSING");
+  EXPECT_EQ(ReadSpatialProgram("S400 M3\nM2\n", WorkedMotion()).faults.at(0).reason,
+            "SPINDLE_SPEED_OUT_OF_RANGE");
+  Operation pierce;
+  pierce.kind = OperationKind::kPierce;
+  EXPECT_EQ(PlanOf({pierce}).faults.at(0).reason, "OPERATION_NOT_DRIVEN");
 }
 
 TEST(SpatialCldata, ItsToolAxisIsThatOfTheRotaryWords) {

@@ -20,7 +20,7 @@ constexpr double kInchMm = 25.4;
 constexpr double kAxisTolerance = 1e-6;    // of a unit vector's components
 constexpr double kVectorTolerance = 1e-3;  // of a tool axis' length
 constexpr double kAngleTolerance_rad = 1e-3;
-constexpr double kNoRise_mm = 1e-9;
+constexpr double kSamePlace_mm = 1e-3;  // posts write three to six decimals
 constexpr double kLeastRise =
     0.5;  // cosine between two tools' axes up to which one rises over the other's hole
 
@@ -797,11 +797,12 @@ class Reader {
       return false;
     }
     const double height = moved_ ? HeightOver(entry, position_) : 0.0;
-    if (height > cycle_->heights.clear_mm + kNoRise_mm) {
+    if (height > cycle_->heights.clear_mm + kSamePlace_mm) {
       Move(OperationKind::kTraverse, Over(entry, height));
     }
     const std::vector<HoleStep> steps = StepsOf(cycle_->heights);
-    for (std::size_t i = 0; i < steps.size() && !stopped_; ++i) {
+    for (std::size_t i = StandsAt(Over(entry, steps.front().height_mm)) ? 1 : 0;
+         i < steps.size() && !stopped_; ++i) {
       if (i + 1 == steps.size() && cycle_->dwell_s > 0.0) {
         Add(OperationKind::kDwell)->value = cycle_->dwell_s;
       }
@@ -810,6 +811,12 @@ class Reader {
       o.feed_mm_per_s = feed_mm_per_s;
     }
     return !stopped_;
+  }
+
+  bool StandsAt(const Vector& p) const {
+    const double turned = std::hypot(stands_[0] - axis_[0], stands_[1] - axis_[1], stands_[2] - axis_[2]);
+    return moved_ && turned < kAxisTolerance &&
+           std::hypot(p[0] - position_[0], p[1] - position_[1], p[2] - position_[2]) < kSamePlace_mm;
   }
 
   bool DrillsHere(double feed_mm_per_s) {
@@ -853,7 +860,7 @@ class Reader {
   // From below the height at which the next hole is gone to: out along the tool as it stands.
   bool RiseOver(const Vector& entry) {
     const double missing_mm = cycle_->heights.clear_mm - HeightOver(entry, position_);
-    if (!moved_ || missing_mm <= kNoRise_mm) {
+    if (!moved_ || missing_mm <= kSamePlace_mm) {
       return true;
     }
     if (stands_[2] < kLeastRise) {

@@ -217,7 +217,8 @@ bool OneTakesEach(Reading& r) {
   const int once = r.code(kOnce), machine = r.code(kMachineWord), output = r.code(kOutput);
   const int motion = r.code(kMotion) != kNoCode || !r.HasAxisWords() ? r.code(kMotion) : r.state.motion;
   const int path = r.code(kPathMode) == 640, call = r.code(kCallWord) == 980;
-  const int p = (once == 40) + (once == 100) + (r.code(kJet) == 30 || r.code(kJet) == 40) +
+  const int p = (once == 40) + (once == 100) +
+                (!r.has_spindle() && (r.code(kJet) == 30 || r.code(kJet) == 40)) +
                 (output != kNoCode && output < 670) + (machine == 1000 || machine == 1010) + path + call +
                 TakesP(motion);
   const int q = (output >= 660) + path + (motion == 50 || motion == 830);
@@ -312,6 +313,9 @@ bool Pierce(Reading& r) {
 }
 
 bool Jet(Reading& r) {
+  if (r.has_spindle()) {
+    return ObeySpindle(r);
+  }
   switch (r.code(kJet)) {
     case 30:
     case 40:
@@ -325,7 +329,10 @@ bool Jet(Reading& r) {
 }
 
 void SwitchAbrasive(Reading& r, bool on) {
-  r.Add(on ? OperationKind::kAbrasiveOn : OperationKind::kAbrasiveOff);
+  const bool coolant = r.has_spindle();
+  r.Add(on        ? coolant ? OperationKind::kCoolantOn : OperationKind::kAbrasiveOn
+        : coolant ? OperationKind::kCoolantOff
+                  : OperationKind::kAbrasiveOff);
   r.state.abrasive_on = on;
 }
 
@@ -405,6 +412,10 @@ bool Outputs(Reading& r) {
   const int m = r.code(kOutput);
   if (m == kNoCode) {
     return true;
+  }
+  if (r.has_spindle()) {
+    return r.FaultAt(kOutput, "OUTPUT_UNKNOWN",
+                     "this machine has no jet and no inputs; M3, M5, M8 and M9 switch what it has");
   }
   if (m == 660) {
     return WaitForInput(r);
@@ -630,7 +641,9 @@ void RefuseUnused(Reading& r) {
     case 'S':
     case 'T':
     case 'H':
-      r.FaultAt(letter, "WORD_NOT_SUPPORTED", "a jet has no spindle speed and no tool numbers");
+      r.FaultAt(letter, "WORD_NOT_SUPPORTED",
+                r.has_spindle() ? "this machine has one tool; G10 L1 and G43 H take its length"
+                                : "a jet has no spindle speed and no tool numbers");
       break;
     default:
       r.FaultAt(letter, "WORD_WITHOUT_USE", "no word of this line takes this one");
@@ -697,6 +710,12 @@ void SwitchJetOff(Reading& r) {
 void EndProgram(Reading& r) {
   if (r.state.jet_on) {
     SwitchJetOff(r);
+  }
+  if (r.has_spindle()) {
+    StopSpindle(r);
+    if (r.state.abrasive_on) {
+      SwitchAbrasive(r, false);
+    }
   }
   r.Add(OperationKind::kEnd);
   r.ended = true;

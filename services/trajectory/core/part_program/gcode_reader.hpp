@@ -25,6 +25,7 @@ struct GcodeOptions {
   double kerf_width_mm = 0.0;     // of the machine, for G41 and G42 without a tool of the program's own
   double abrasive_flow_max_g_per_min = 1000.0;    // of the machine, for M67 and M68; 0: it has no such output
   bool process_inputs = true;                     // the machine has those that M66 waits for
+  SpindleRange spindle = {};                      // of a machine that moves Z
   double default_tolerance_mm = 0.02;             // G64 without P
   double arc_radius_tolerance_mm = 0.005;         // how far start and end of an arc may differ in radius …
   double arc_radius_tolerance_ratio = 1e-3;       // … or by this share of it …

@@ -85,8 +85,10 @@ struct ModalState {
   double kerf_offset_mm = 0.0;
   bool kerf_ends = false;  // G40 stands before the next motion
   bool jet_on = false;
-  bool abrasive_on = false;
   bool waited_for_input = false;  // since #5399 was set
+  bool abrasive_on = false;       // or the coolant, where there is a spindle
+  double spindle_per_min = 0.0;   // of S
+  double turns_per_min = 0.0;     // as the spindle turns, clockwise positive; 0: it stands
   CycleMemory cycle;
   std::optional<std::array<double, 2>>
       spline_end;  // from the last spline's end to its second control point, mm
@@ -127,6 +129,8 @@ class Reading : public StateParameters {
   double unit(std::size_t axis) const { return axis < kLinearAxes ? state.unit_mm : 1.0; }
   double mm(double written) const { return written * state.unit_mm; }
   bool HasAxisWords() const;
+  // A machine that moves Z has a spindle, another one a jet.
+  bool has_spindle() const { return drives(2); }
 
   Operation& Add(OperationKind kind);
   // A motion to there, with the kerf offset that is on.
@@ -166,6 +170,8 @@ bool ObeySpline(Reading& r, bool cubic);
 bool ObeyCycle(Reading& r);
 void EndProgram(Reading& r);
 void SwitchJetOff(Reading& r);
+bool ObeySpindle(Reading& r);  // S M3 M4 M5
+void StopSpindle(Reading& r);
 void ObeyBlock(Reading& r);
 
 // Leaves of motion that the parts share.

@@ -14,7 +14,7 @@ struct Fixed {
   double value;
 };
 // What LinuxCNC programs may ask for and this machine has in one way only.
-constexpr std::array<Fixed, 25> kFixed = {{{"_vmajor", 2.9},
+constexpr std::array<Fixed, 24> kFixed = {{{"_vmajor", 2.9},
                                            {"_vminor", 0.0},
                                            {"_units_per_rev", 0.0},
                                            {"_spindle_rpm_mode", 1.0},
@@ -25,7 +25,6 @@ constexpr std::array<Fixed, 25> kFixed = {{{"_vmajor", 2.9},
                                            {"_feed_override", 1.0},
                                            {"_adaptive_feed", 0.0},
                                            {"_feed_hold", 1.0},
-                                           {"_rpm", 0.0},
                                            {"_u", 0.0},
                                            {"_v", 0.0},
                                            {"_w", 0.0},
@@ -72,8 +71,9 @@ std::optional<double> ModeNamed(const ModalState& state, std::string_view name) 
                          {"_retract_r_plane", state.return_to_r ? 1.0 : 0.0},
                          {"_retract_old_z", state.return_to_r ? 0.0 : 1.0},
                          {"_ijk_absolute_mode", state.arc_absolute ? 1.0 : 0.0},
-                         {"_spindle_on", state.jet_on ? 1.0 : 0.0},
-                         {"_spindle_cw", state.jet_on ? 1.0 : 0.0},
+                         {"_spindle_on", state.jet_on || state.turns_per_min != 0.0 ? 1.0 : 0.0},
+                         {"_spindle_cw", state.jet_on || state.turns_per_min > 0.0 ? 1.0 : 0.0},
+                         {"_rpm", state.spindle_per_min},
                          {"_mist", state.abrasive_on ? 1.0 : 0.0},
                          {"_flood", state.abrasive_on ? 1.0 : 0.0},
                          {"_feed", state.feed_per_min}};

@@ -61,7 +61,7 @@ PartProgram ReadSpatialProgram(std::string_view text, const HexapodMotion& motio
   options.gcode.abrasive_flow_max_g_per_min = 0.0;  // a hexapod's own players have neither
   options.gcode.process_inputs = false;
   options.cldata.tool_angles = ToolAngles::kRollPitch;
-  options.cldata.spindle = {motion.spindle_least_per_min, motion.spindle_most_per_min};
+  options.gcode.spindle = options.cldata.spindle = {motion.spindle_least_per_min, motion.spindle_most_per_min};
   PartProgram program = ReadPartProgram(text, options);
   const auto moved = std::find_if(program.operations.begin(), program.operations.end(),
                                   [](const Operation& o) { return o.kerf_offset_mm != 0.0; });

@@ -251,6 +251,14 @@ class OperationWriter {
       case OperationKind::kWaitInput:
         return "M66 P" + std::to_string(static_cast<int>(o.condition.input())) + " L" +
                std::to_string(static_cast<int>(o.condition.event())) + " Q" + Number(o.value);
+      case OperationKind::kSpindleOn:
+        return "S" + Number(std::abs(o.value)) + (o.value > 0.0 ? " M3" : " M4");
+      case OperationKind::kSpindleOff:
+        return "M5";
+      case OperationKind::kCoolantOn:
+        return "M8";
+      case OperationKind::kCoolantOff:
+        return "M9";
       default:
         return "M2";
     }
