@@ -19,6 +19,7 @@
 #include "trajectory/core/feed/binding.hpp"
 #include "trajectory/core/feed/early_plan.hpp"
 #include "trajectory/core/feed/plan_program.hpp"
+#include "trajectory/core/idle_motion/jerk_limited_move.hpp"
 #include "trajectory/core/part_program/read_program.hpp"
 
 namespace lambdajet::trajectory {
@@ -457,6 +458,44 @@ TEST(FeedLaw, ShortBlocksHoldTheFeed) {
   EXPECT_GE(eight, 0.95);
   EXPECT_LE(circle, 1.0 + 1e-4);
   EXPECT_LE(eight, 1.0 + 1e-4);
+}
+
+// Of places a fixed time apart, how many lie more than a micrometre from both ends.
+std::ptrdiff_t BetweenEnds(const std::vector<double>& ways_mm, double length_mm) {
+  return std::count_if(ways_mm.begin(), ways_mm.end(),
+                       [length_mm](double way) { return way > 1e-3 && way < length_mm - 1e-3; });
+}
+
+// An idle move from rest to rest, its smoothing included, against the quickest move that the path's velocity, acceleration and
+// jerk limits allow.
+TEST(IdleLaw, MovesFromRestAreNearTheQuickest) {
+  const MachineDescription m = DemoLikeMachine();
+  const MoveLimits limits{m.path.rapid_mm_per_s, m.path.acceleration_mm_per_s2, m.path.jerk_mm_per_s3};
+  double worst = 0.0;
+  for (const double length_mm : {10.0, 20.0, 50.0, 100.0, 200.0, 400.0}) {
+    SCOPED_TRACE(length_mm);
+    char text[128];
+    std::snprintf(text, sizeof text, "G0 X200 Y300\nG4 P0.1\nG0 X%g Y300\nG4 P0.1\nM2\n", 200.0 + length_mm);
+    const PlannedProgram planned = PlanPartProgram(text, m, {});
+    ASSERT_TRUE(planned.faults.empty()) << planned.faults[0].message;
+    std::vector<double> ways_mm;  // a tenth of a millisecond apart
+    for (const Segment& s : planned.plan.segments) {
+      for (int k = 0; k < static_cast<int>(std::lround(1e4 * s.duration_s)); ++k) {
+        ways_mm.push_back(s.s_mm.value(1e-4 * k));
+      }
+    }
+    const JerkLimitedMove quickest = SolveMove({length_mm, 0.0, 0.0}, limits);
+    std::vector<double> quickest_mm;
+    for (int k = 0; 1e-4 * k < quickest.duration_s; ++k) {
+      quickest_mm.push_back(quickest.At(1e-4 * k).way_mm);
+    }
+    const double ratio = static_cast<double>(BetweenEnds(ways_mm, length_mm)) /
+                         static_cast<double>(BetweenEnds(quickest_mm, length_mm));
+    EXPECT_GE(ratio, 1.0 - 1e-3);
+    EXPECT_LE(ratio, 1.06);
+    worst = std::max(worst, ratio);
+  }
+  PrintFigure("idle.from_rest_ratio", worst);
 }
 
 // With jerk made inactive: from rest to rest at v under a, no plan is quicker than length / v + v / a, more at corners, which

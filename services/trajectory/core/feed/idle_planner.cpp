@@ -19,14 +19,16 @@ kinematics::Motion MotionAt(const IdleMove& move, double t) {
 
 enum class Verdict { kGood, kTooFast, kOutOfReach };
 
-Verdict CheckMotion(const PlanningModel& model, const kinematics::Motion& motion, double slow) {
+// `overshoot` of the smoothing on this motion's acceleration: only where the path bends it is above 1.
+Verdict CheckMotion(const PlanningModel& model, const kinematics::Motion& motion, double slow,
+                    double overshoot) {
   const auto answer = model.sheet.Actuators(motion);
   if (answer.reason != kinematics::Reason::kSolved || !answer.differentiable) {
     return Verdict::kOutOfReach;
   }
   const PathLimits& path = model.machine.path;
   bool good = motion.velocity_mm_per_s.norm() <= slow * path.rapid_mm_per_s * (1.0 + 1e-9) &&
-              motion.acceleration_mm_per_s2.norm() * model.overshoot <=
+              motion.acceleration_mm_per_s2.norm() * overshoot <=
                   slow * slow * model.path_acceleration_mm_per_s2 * (1.0 + 1e-9);
   for (int j = 0; j < 2; ++j) {
     good = good &&
@@ -41,7 +43,8 @@ Verdict CheckMotion(const PlanningModel& model, const kinematics::Motion& motion
 Verdict CheckLaws(const PlanningModel& model, const IdleMove& move, double slow) {
   Verdict worst = Verdict::kGood;
   for (int k = 0; k <= kChecks; ++k) {
-    const Verdict verdict = CheckMotion(model, MotionAt(move, move.duration_s * k / kChecks), slow);
+    const Verdict verdict =
+        CheckMotion(model, MotionAt(move, move.duration_s * k / kChecks), slow, model.overshoot);
     worst = std::max(worst, verdict);
   }
   return worst;
@@ -122,7 +125,7 @@ Verdict CheckStraight(const PlanningModel& model, const Vector2d& from, const Ve
     const double s = length * k / kChecks;
     const double v = std::min(speed, std::sqrt(2.0 * acceleration * std::min(s, length - s)));
     for (const double sign : {-1.0, 1.0}) {
-      worst = std::max(worst, CheckMotion(model, {from + s * u, v * u, sign * acceleration * u}, slow));
+      worst = std::max(worst, CheckMotion(model, {from + s * u, v * u, sign * acceleration * u}, slow, 1.0));
     }
   }
   return worst;
@@ -131,7 +134,7 @@ Verdict CheckStraight(const PlanningModel& model, const Vector2d& from, const Ve
 std::optional<IdleMove> FromRest(const PlanningModel& model, const Vector2d& from, const Vector2d& to,
                                  double slow) {
   double speed = slow * model.machine.path.rapid_mm_per_s;
-  double acceleration = slow * slow * model.path_acceleration_mm_per_s2 / model.overshoot;
+  double acceleration = slow * slow * model.path_acceleration_mm_per_s2;
   for (int i = 0; i < kGrowthLimit; ++i) {
     const Verdict verdict = CheckStraight(model, from, to, speed, acceleration, slow);
     if (verdict == Verdict::kOutOfReach) {

@@ -1,7 +1,9 @@
 // Chooses how an idle move is made: as quick as path and actuator limits allow.
 //
-// Model: from standstill a trapezoid along the straight line; from the speed at the end of a cut one idle law a coordinate
-// (seed paper 003), its duration the shortest whose speed, acceleration and actuator motion stay within their limits.
+// Model: from standstill a trapezoid along the straight line, which the smoothing that every motion passes makes jerk-limited:
+// some hundredths longer than the quickest such move (idle_motion/jerk_limited_move), which smoothed once more would be
+// slower still. From the speed at the end of a cut one idle law a coordinate (seed paper 003), its duration the shortest whose
+// speed, acceleration and actuator motion stay within their limits.
 // Frames: W. Units: mm, s. Threads: pure. Cost: about 0.1 ms a move.
 #pragma once
 
