@@ -334,6 +334,137 @@ TEST_F(Modules, LostPressureTakesTheJetOffAndHoldsTheDrive) {
   EXPECT_FALSE(cell_.main_motion().jet_on);
 }
 
+// The valve is told to close and does not: the machine says so itself, and takes the pressure off.
+TEST_F(Modules, AJetThatNeverClosesHasAReasonOfItsOwn) {
+  Cut();
+  cell_.main_motion_plant().Inject({simulated_plant::FaultKind::kValveDelay, 0, 0.0, 60.0, 50.0});
+  Told(Verb::kHold);
+  ASSERT_TRUE(Drive(ModuleMode::kHeld));
+  ASSERT_TRUE(cell_.StepUntil([&] { return cell_.drive().reason == ModuleReason::kJetNotClosed; }, 1.5));
+  EXPECT_EQ(cell_.drive().mode, ModuleMode::kHeld);
+  EXPECT_EQ(cell_.main_motion().mode, ModuleMode::kFault);
+  EXPECT_EQ(cell_.main_motion().reason, ModuleReason::kJetNotClosed);
+  EXPECT_TRUE(cell_.main_motion().jet_on);
+  EXPECT_EQ(Told(Verb::kResume).answer, CommandAnswer::kRefused);
+  ASSERT_TRUE(cell_.StepUntil([&] { return cell_.main_motion().pump_pressure_mpa < 40.0; }, 3.0));
+  ASSERT_TRUE(Drive(ModuleMode::kStopped));
+  EXPECT_EQ(cell_.drive().reason, ModuleReason::kJetNotClosed);
+}
+
+TEST_F(Modules, TheFlowOfAbrasiveChangesAtItsPlaceOnThePath) {
+  HandMadePlan plan(machine_);
+  plan.From(200, 300);
+  plan.LineTo(210, 300, 250);
+  plan.Gate(GateKind::kPierce, 0.05);
+  plan.LineTo(400, 300, 100);
+  const double fast_mm = plan.s_mm() - 90.0, none_mm = plan.s_mm() - 30.0;
+  plan.EventAt(ProcessAction::kAbrasiveFlow, fast_mm, 520.0);
+  plan.EventAt(ProcessAction::kAbrasiveFlow, none_mm, 0.0);
+  plan.Event(ProcessAction::kAbrasiveOff);
+  plan.Event(ProcessAction::kJetOff);
+  cell_.Begin(plan.Finish(21));
+  const auto flows = [&](double g_per_min, double s_mm) {
+    return cell_.StepUntil(
+               [&] {
+                 return cell_.main_motion().abrasive_on &&
+                        cell_.main_motion().abrasive_g_per_min == g_per_min;
+               },
+               20.0) &&
+           std::abs(cell_.drive().s_mm - s_mm) < 0.5;
+  };
+  EXPECT_TRUE(flows(machine_.process.abrasive_flow_g_per_min, 10.0))
+      << "a plan begins with the machine's own";
+  EXPECT_TRUE(flows(520.0, fast_mm)) << cell_.drive().s_mm;
+  EXPECT_TRUE(flows(0.0, none_mm)) << cell_.drive().s_mm;
+  ASSERT_TRUE(Drive(ModuleMode::kComplete, 20.0));
+  const CellRun run = cell_.Take();
+  ASSERT_EQ(run.process_records.size(), 4u);
+  for (std::size_t i = 0; i < 2; ++i) {
+    const ProcessRecord& record = run.process_records[i];
+    EXPECT_EQ(record.action, ProcessAction::kAbrasiveFlow);
+    EXPECT_EQ(record.argument, i == 0 ? 520.0 : 0.0);
+    EXPECT_EQ(record.s_wanted_mm, i == 0 ? fast_mm : none_mm);
+    EXPECT_LE(std::abs(record.deviation_mm), 0.1);
+  }
+}
+
+// After a hold behind a change of flow the cut goes on with the flow of its place.
+TEST_F(Modules, AResumeRestoresTheFlowOfAbrasive) {
+  HandMadePlan plan(machine_);
+  plan.From(200, 300);
+  plan.LineTo(210, 300, 250);
+  plan.Gate(GateKind::kPierce, 0.05);
+  plan.EventAt(ProcessAction::kAbrasiveFlow, plan.s_mm() + 20.0, 520.0);
+  plan.EventAt(ProcessAction::kAbrasiveFlow, plan.s_mm() + 80.5, 600.0);
+  plan.LineTo(400, 300, 100);
+  cell_.Begin(plan.Finish(22));
+  ASSERT_TRUE(cell_.StepUntil([&] { return cell_.main_motion().abrasive_g_per_min == 600.0; }, 20.0));
+  Told(Verb::kHold);
+  ASSERT_TRUE(Drive(ModuleMode::kHeld));
+  Told(Verb::kRetrace, 40.0);
+  ASSERT_TRUE(Drive(ModuleMode::kHolding));
+  ASSERT_TRUE(Drive(ModuleMode::kHeld));
+  ASSERT_LT(cell_.drive().s_mm, 80.0);
+  Told(Verb::kResume);
+  ASSERT_TRUE(Drive(ModuleMode::kRunning, 10.0));
+  EXPECT_EQ(cell_.main_motion().abrasive_g_per_min, 520.0);
+  EXPECT_TRUE(cell_.StepUntil([&] { return cell_.main_motion().abrasive_g_per_min == 600.0; }, 5.0));
+}
+
+Plan Waiting(const MachineDescription& machine, InputEvent event, double seconds,
+             ProcessInput input = ProcessInput::kAbrasivePresent) {
+  HandMadePlan plan(machine);
+  plan.From(300, 300);
+  plan.LineTo(340, 300, 250);
+  plan.Gate(GateKind::kInput, seconds, InputCondition::Of(input, event));
+  plan.LineTo(380, 300, 250);
+  return plan.Finish(23);
+}
+
+TEST_F(Modules, TheDriveStandsUntilTheInputComes) {
+  constexpr auto kEmpty = simulated_plant::FaultKind::kHopperEmpty;
+  struct Case {
+    InputEvent event;
+    double from_s, for_s;  // the hopper is empty
+    double wait_s;
+  };
+  // High and low take what is so already; a rise and a fall wait for the change.
+  for (const Case& c : {Case{InputEvent::kHigh, 0.0, 0.0, 0.0}, Case{InputEvent::kHigh, 0.0, 0.7, 0.7},
+                        Case{InputEvent::kLow, 0.0, 0.7, 0.0}, Case{InputEvent::kLow, 0.4, 5.0, 0.4},
+                        Case{InputEvent::kRise, 0.3, 0.5, 0.8}, Case{InputEvent::kFall, 0.3, 0.5, 0.3}}) {
+    VirtualCell cell(machine_, simulated_plant::NominalPlant(machine_), {});
+    cell.Begin(Waiting(machine_, c.event, 5.0));
+    ASSERT_TRUE(cell.StepUntil([&] { return cell.drive().s_mm > 39.0; }, 20.0));
+    cell.main_motion_plant().Inject({kEmpty, 0, c.from_s, c.for_s, 0.0});
+    const std::int64_t asked_ns = cell.now_ns();
+    ASSERT_TRUE(cell.StepUntil([&] { return cell.drive().gate_passed == 1; }, 10.0));
+    EXPECT_NEAR(1e-9 * static_cast<double>(cell.now_ns() - asked_ns), c.wait_s, 0.15)
+        << static_cast<int>(c.event);
+    EXPECT_TRUE(cell.StepUntil([&] { return cell.drive().mode == ModuleMode::kComplete; }, 5.0));
+  }
+}
+
+TEST_F(Modules, AnInputThatDoesNotComeHoldsTheMachineWithItsReason) {
+  cell_.Begin(Waiting(machine_, InputEvent::kLow, 0.5, ProcessInput::kPumpAtPressure));
+  ASSERT_TRUE(Drive(ModuleMode::kHeld, 20.0));
+  EXPECT_EQ(cell_.drive().reason, ModuleReason::kInputTimeout);
+  EXPECT_EQ(cell_.drive().gate_passed, 0u);
+  cell_.Step(0.2);
+  EXPECT_EQ(cell_.main_motion().mode, ModuleMode::kHeld);
+  EXPECT_EQ(cell_.main_motion().reason, ModuleReason::kInputTimeout);
+  EXPECT_EQ(Name(ModuleReason::kInputTimeout), "INPUT_TIMEOUT");
+  // Going on waits again, for the whole time.
+  Told(Verb::kResume);
+  ASSERT_TRUE(Drive(ModuleMode::kRunning));
+  const std::int64_t again_ns = cell_.now_ns();
+  ASSERT_TRUE(Drive(ModuleMode::kHeld));
+  EXPECT_GE(cell_.now_ns() - again_ns, 450'000'000);
+  EXPECT_EQ(cell_.drive().reason, ModuleReason::kInputTimeout);
+  cell_.main_motion_plant().Inject({simulated_plant::FaultKind::kPressureLoss, 0, 0.0, 10.0, 0.0});
+  Told(Verb::kResume);
+  EXPECT_TRUE(Drive(ModuleMode::kComplete));
+}
+
 TEST_F(Modules, DwellsAndStopsOpenByThemselvesAndByThePerson) {
   HandMadePlan plan(machine_);
   plan.From(300, 300);

@@ -352,18 +352,25 @@ void DriveCore::WatchPeer() {
   peer_lost_ = peer_watch_.Turn(now_ns_, ToNs(config_.peer_deadline_s));
   if (PeerFit()) {
     peer_unfit_since_ns_ = 0;
-    // Main motion missed the drive for a moment and has taken the jet off; the path must not go on without it.
+    // Main motion missed the drive for a moment, or an input that the program waits for, and has taken the jet off; the
+    // path must not go on without it.
     const bool jetless =
-        (peer_.mode == kHolding || peer_.mode == kHeld) && peer_.reason == ModuleReason::kPeerLost;
+        (peer_.mode == kHolding || peer_.mode == kHeld) &&
+        (peer_.reason == ModuleReason::kPeerLost || peer_.reason == ModuleReason::kInputTimeout);
     if (jetless && (mode_ == kRunning || (mode_ == kResuming && ramping_up_))) {
-      Apply(Event::kHold, ModuleReason::kPeerLost);
+      Apply(Event::kHold, peer_.reason);
     }
     return;
   }
   if (peer_unfit_since_ns_ == 0 || (peer_lost_ && !was_lost)) {
     peer_unfit_since_ns_ = now_ns_;
   }
-  const ModuleReason reason = peer_lost_ ? ModuleReason::kPeerLost : ModuleReason::kPeerStopped;
+  // Water that still flows where it was told to cease is why nothing goes on, and what a person must see to.
+  const bool flowing = !peer_lost_ && peer_.mode == kFault && peer_.reason == ModuleReason::kJetNotClosed;
+  const ModuleReason reason = peer_lost_ ? ModuleReason::kPeerLost
+                              : flowing  ? ModuleReason::kJetNotClosed
+                                         : ModuleReason::kPeerStopped;
+  reason_ = flowing && mode_ == kHeld ? reason : reason_;
   if (mode_ == kRunning || mode_ == kResuming) {
     Apply(Event::kHold, reason);
   } else if (mode_ == kHeld && now_ns_ - peer_unfit_since_ns_ > ToNs(config_.peer_patience_s)) {

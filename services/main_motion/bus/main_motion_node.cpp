@@ -117,6 +117,8 @@ void NodeConfig::Declare(ConfigSchema& schema) {
   schema.Add("process.stand_off_mm", &core.stand_off_mm, {0.5, 20.0}, "tube to sheet");
   schema.Add("process.gate_timeout_s", &core.gate_timeout_s, {1.0, 600.0},
              "a gate that takes longer is a fault");
+  schema.Add("process.water_off_timeout_s", &core.water_off_timeout_s, {0.1, 60.0},
+             "water that still flows so long after it was told to cease is a fault");
   schema.Add("process.camera_interval_s", &core.camera_interval_s, {0.004, 1.0},
              "between two tracking pictures");
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <utility>
 
 namespace lambdajet::main_motion {
 namespace {
@@ -29,10 +30,14 @@ bool OnValve(ProcessAction action) {
   return action != ProcessAction::kCameraTrackOn && action != ProcessAction::kCameraTrackOff;
 }
 Valve ValveOf(ProcessAction action) {
+  if (action == ProcessAction::kAbrasiveFlow) {
+    return Valve::kAbrasiveFeeder;
+  }
   return action == ProcessAction::kJetOn || action == ProcessAction::kJetOff ? Valve::kJet : Valve::kAbrasive;
 }
 bool TurnsOn(ProcessAction action) {
-  return action == ProcessAction::kJetOn || action == ProcessAction::kAbrasiveOn;
+  return action == ProcessAction::kJetOn || action == ProcessAction::kAbrasiveOn ||
+         action == ProcessAction::kAbrasiveFlow;
 }
 bool PeerDown(ModuleMode mode) {
   return mode == kOff || mode == kInitialising || mode == kSafe || mode == kStopping || mode == kStopped ||
@@ -62,7 +67,8 @@ void MainMotionCore::AdoptMachine(const MachineDescription& machine) {
   machine_version_ = machine.version;
   process_ = machine.process;
   const decltype(nominal_s_) nominal_s = {{{process_.jet_off_delay_s, process_.jet_on_delay_s},
-                                           {process_.abrasive_off_delay_s, process_.abrasive_on_delay_s}}};
+                                           {process_.abrasive_off_delay_s, process_.abrasive_on_delay_s},
+                                           {process_.abrasive_on_delay_s, process_.abrasive_on_delay_s}}};
   if (nominal_s != nominal_s_) {  // a new identification does not make the valves forget
     nominal_s_ = delay_s_ = nominal_s;
     delays_seen_ = {};
@@ -269,6 +275,11 @@ void MainMotionCore::WatchHardware() {
     closing_ = false;
     Apply(Event::kOutputsOff, reason_);
   }
+  if (!closing_) {
+    closing_since_ns_ = now_ns_;
+  } else if (now_ns_ - closing_since_ns_ > ToNs(config_.water_off_timeout_s)) {
+    Apply(Event::kFault, ModuleReason::kJetNotClosed);  // the pump goes idle
+  }
 }
 
 void MainMotionCore::WatchPressure() {
@@ -363,6 +374,7 @@ void MainMotionCore::RunGate() {
     gate_running_ = waiting;
     gate_since_ns_ = now_ns_;
     picture_asked_ = picture_taken_ = false;
+    input_before_ = Reads(gate.condition.input());
     if (gate.kind == GateKind::kPierce) {
       BeginPierce(gate.argument);
     }
@@ -379,8 +391,10 @@ void MainMotionCore::RunGate() {
         PassGate(gate);
       }
       return;
-    case GateKind::kStop:
     case GateKind::kInput:
+      RunInputGate(gate);
+      return;
+    case GateKind::kStop:
     case GateKind::kNone:
       return;  // the operator's
   }
@@ -414,6 +428,24 @@ void MainMotionCore::RunMeasureGate(const Gate& gate) {
   asked_[request % asked_.size()] = {request, gate.id, mark};
   hardware_.TakePicture(request, mark >= kFirstHole ? Feature::kHole : Feature::kMark,
                         now_ns_ + 2 * period_ns_);
+}
+
+void MainMotionCore::RunInputGate(const Gate& gate) {
+  const bool before = std::exchange(input_before_, Reads(gate.condition.input()));
+  const InputEvent event = gate.condition.event();
+  const bool wanted = event == InputEvent::kRise || event == InputEvent::kHigh;
+  const bool edge = event == InputEvent::kRise || event == InputEvent::kFall;
+  if (input_before_ == wanted && (!edge || before != wanted)) {
+    PassGate(gate);
+  } else if (now_ns_ - gate_since_ns_ > ToNs(gate.argument)) {
+    Apply(Event::kInputMissing, ModuleReason::kInputTimeout);
+  }
+}
+
+bool MainMotionCore::Reads(ProcessInput input) const {
+  return input == ProcessInput::kAbrasivePresent
+             ? readings_.abrasive_present
+             : readings_.pump_pressure_mpa >= config_.pressure_ready_ratio * config_.pump_pressure_mpa;
 }
 
 void MainMotionCore::PassGate(const Gate& gate) {
@@ -528,7 +560,7 @@ void MainMotionCore::RunValveEvent(const ProcessEvent& event, std::int64_t due_n
     }
     return;
   }
-  Command(valve, on, at_ns);
+  Command(valve, on, at_ns, event.argument);
   awaited_[v].of_event = true;
   awaited_[v].event = event.index;
   scheduled_[v] = true;
@@ -624,6 +656,7 @@ void MainMotionCore::SettleRecords() {
       record.plan = plan_;
       record.event = event.index;
       record.action = event.action;
+      record.argument = event.argument;
       record.s_wanted_mm = event.s_mm;
       record.s_rate_mm_per_s = *rate;
       record.effect_ns = pending.effect_ns;
@@ -734,6 +767,7 @@ void MainMotionCore::Act(Action action) {
       arming_ = true;
       hardware_.SetStandOff(config_.stand_off_mm);
       hardware_.SetPump(true);
+      SetFlowAt(0.0);
       break;
     case Action::kSuspend:
       WaterOff();
@@ -743,6 +777,7 @@ void MainMotionCore::Act(Action action) {
       const double s_mm = track_.newest().s_mm;
       RewindEvents(s_mm);
       restoring_ = WaterWantedAt(s_mm);
+      SetFlowAt(s_mm);
       break;
     }
     case Action::kFinish:
@@ -759,10 +794,15 @@ void MainMotionCore::Act(Action action) {
   }
 }
 
-void MainMotionCore::Command(Valve valve, bool on, std::int64_t at_ns) {
-  hardware_.ScheduleOutput(valve, on, at_ns);
+void MainMotionCore::Command(Valve valve, bool on, std::int64_t at_ns, double flow_g_per_min) {
   const auto v = static_cast<std::size_t>(valve);
-  if (on) {
+  const bool feeder = valve == Valve::kAbrasiveFeeder;
+  if (feeder) {
+    hardware_.ScheduleFlow(flow_g_per_min, at_ns);
+  } else {
+    hardware_.ScheduleOutput(valve, on, at_ns);
+  }
+  if (on && !feeder) {
     const double latest_s = delay_s(valve, true) + kDelayClamp * nominal_s_[v][1] + kDelaySlack_s;
     on_its_way_until_ns_[v] = std::max(at_ns, now_ns_) + ToNs(latest_s);
   }
@@ -774,18 +814,41 @@ void MainMotionCore::Command(Valve valve, bool on, std::int64_t at_ns) {
   awaited.peer_age_s = track_.empty() ? 0.0 : ToSeconds(now_ns_ - track_.newest().header.time_ns);
 }
 
+// The flow that the last setting on the way to s asked for, or the machine's own.
+void MainMotionCore::SetFlowAt(double s_mm) {
+  double flow_g_per_min = process_.abrasive_flow_g_per_min;
+  bool known = flow_g_per_min > 0.0;
+  for (const ProcessEvent& event : events_) {
+    if (event.s_mm > s_mm + kSame_mm) {
+      break;
+    }
+    if (event.action == ProcessAction::kAbrasiveFlow) {
+      flow_g_per_min = event.argument;
+      known = true;
+    }
+  }
+  if (known) {
+    Command(Valve::kAbrasiveFeeder, true, now_ns_, flow_g_per_min);
+  }
+}
+
+void MainMotionCore::TakeBack(Valve valve) {
+  const auto v = static_cast<std::size_t>(valve);
+  if (scheduled_[v]) {
+    scheduled_[v] = false;
+    progress_[awaited_[v].event] = Progress::kWaiting;
+  }
+  hardware_.CancelOutput(valve);
+  awaited_[v].pending = false;
+}
+
 // Abrasive first, so that the tube is rinsed; both at once, whatever was scheduled.
 void MainMotionCore::WaterOff() {
   for (const Valve valve : {Valve::kAbrasive, Valve::kJet}) {
-    const auto v = static_cast<std::size_t>(valve);
-    if (scheduled_[v]) {
-      scheduled_[v] = false;
-      progress_[awaited_[v].event] = Progress::kWaiting;
-    }
-    hardware_.CancelOutput(valve);
+    TakeBack(valve);
     hardware_.ScheduleOutput(valve, false, now_ns_);
-    awaited_[v].pending = false;
   }
+  TakeBack(Valve::kAbrasiveFeeder);
   pierce_ = PiercePhase::kNone;
   gate_running_ = 0;
   restoring_ = false;
@@ -862,6 +925,7 @@ void MainMotionCore::Report() {
   state_.abrasive_on = readings_.abrasive_on;
   state_.pump_pressure_mpa = readings_.pump_pressure_mpa;
   state_.abrasive_g_per_min = readings_.abrasive_g_per_min;
+  state_.abrasive_present = readings_.abrasive_present;
   state_.stand_off_mm = readings_.stand_off_mm;
   if (!peer_lost_ && !track_.empty()) {
     state_.s_extrapolated_mm = track_.PathLengthAt(now_ns_).value_or(track_.newest().s_mm);

@@ -3,7 +3,8 @@
 // Model: the module has no clock of its own for the path. From each drive state it predicts when the path reaches the
 // next process events and schedules the outputs early by the valves' delays (learnt from the module's own sensor),
 // moving them as the prediction moves. At a pierce gate it acts only while the drive says that it stands there: stand-off,
-// pressure, jet, pierce time, abrasive; at a measuring gate it lets the machine settle and takes a picture. On a hold the
+// pressure, jet, pierce time, abrasive; at a measuring gate it lets the machine settle and takes a picture; at an input's
+// gate it watches the input, and holds where that does not come in time. On a hold the
 // jet is taken off at standstill, and HELD is said only when no water flows or can still come; a resume pierces again. If the drive falls silent, abrasive and jet go off at once and
 // the pump to idle. State machine: state_table.hpp.
 // Frames and units: mm, s, MPa, g/min; common time in ns; pictures in C.
@@ -38,6 +39,7 @@ struct MainMotionConfig {
   double stand_off_mm = 3.0;
   double stand_off_tolerance_mm = 0.1;
   double gate_timeout_s = 30.0;
+  double water_off_timeout_s = 1.0;  // what was told to close has closed by then
   double camera_interval_s = 0.01;
   double command_age_limit_s = 2.0;
   double valve_learning = 0.1;  // least share of a newly seen delay that is believed
@@ -123,6 +125,8 @@ class MainMotionCore {
   void RunGate();
   void RunPierceGate(const Gate& gate);
   void RunMeasureGate(const Gate& gate);
+  void RunInputGate(const Gate& gate);
+  bool Reads(ProcessInput input) const;
   void RunRestore();
   void BeginPierce(double pierce_time_s);
   bool AdvancePierce();  // true when through
@@ -140,7 +144,9 @@ class MainMotionCore {
 
   bool Apply(Event event, ModuleReason reason);
   void Act(Action action);
-  void Command(Valve valve, bool on, std::int64_t at_ns);
+  void Command(Valve valve, bool on, std::int64_t at_ns, double flow_g_per_min = 0.0);
+  void SetFlowAt(double s_mm);
+  void TakeBack(Valve valve);
   void WaterOff();
   bool WaterGone() const;
   void RewindEvents(double s_mm);
@@ -185,6 +191,7 @@ class MainMotionCore {
   bool arming_ = false;
   bool restoring_ = false;
   bool closing_ = false;  // told to be off, and not yet known to be
+  std::int64_t closing_since_ns_ = 0;
 
   PiercePhase pierce_ = PiercePhase::kNone;
   double pierce_time_s_ = 0.0;
@@ -195,6 +202,7 @@ class MainMotionCore {
   std::int64_t gate_since_ns_ = 0;
   bool picture_asked_ = false;
   bool picture_taken_ = false;
+  bool input_before_ = false;  // as it read one cycle ago
 
   bool tracking_ = false;
   std::int32_t tracked_mark_ = 0;

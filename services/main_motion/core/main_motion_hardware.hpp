@@ -1,4 +1,4 @@
-// Is all that the main-motion module's core knows of its iron: pump, two valves, head and camera.
+// Is all that the main-motion module's core knows of its iron: pump, two valves, abrasive feeder, head and camera.
 //
 // Model: the valves hang on *time-stamped outputs*, like the time-stamped digital outputs of fieldbus terminals: the core
 // says at which instant an output is to switch, and the terminal's own clock switches it, between cycles. One switching
@@ -12,12 +12,13 @@
 
 namespace lambdajet::main_motion {
 
-enum class Valve : std::uint8_t { kJet, kAbrasive };
-inline constexpr std::size_t kValveCount = 2;
+// The feeder meters the abrasive that the valve lets through; its output is a flow.
+enum class Valve : std::uint8_t { kJet, kAbrasive, kAbrasiveFeeder };
+inline constexpr std::size_t kValveCount = 3;
 
 enum class Feature : std::uint8_t { kMark, kHole };
 
-// Water or abrasive began or ceased to arrive at the sheet.
+// Water or abrasive began or ceased to arrive at the sheet; of the feeder: its new flow does, and `on` is true.
 struct OutputEffect {
   Valve valve = Valve::kJet;
   bool on = false;
@@ -43,6 +44,7 @@ struct MainMotionReadings {
   bool abrasive_on = false;
   double pump_pressure_mpa = 0.0;
   double abrasive_g_per_min = 0.0;
+  bool abrasive_present = false;  // in the hopper
   double stand_off_mm = 0.0;
   std::size_t effect_count = 0;  // since the last reading
   std::array<OutputEffect, kEffectsPerCycle> effects{};
@@ -55,6 +57,7 @@ class MainMotionHardware {
   virtual ~MainMotionHardware() = default;
   virtual MainMotionReadings ReadState(std::int64_t now_ns) = 0;
   virtual void ScheduleOutput(Valve valve, bool on, std::int64_t at_ns) = 0;
+  virtual void ScheduleFlow(double abrasive_g_per_min, std::int64_t at_ns) = 0;  // the feeder's output
   virtual void CancelOutput(Valve valve) = 0;
   virtual void SetPump(bool on) = 0;  // off: idle, no pressure
   virtual void SetStandOff(double stand_off_mm) = 0;

@@ -44,6 +44,7 @@ constexpr std::array kTable = std::to_array<Row>({
     {kRunning, E::kPeerHeld, {kHolding, A::kSuspend}},
     {kRunning, E::kPeerComplete, {kComplete, A::kFinish}},
     {kRunning, E::kPeerLost, {kHolding, A::kShutDown}},
+    {kRunning, E::kInputMissing, {kHolding, A::kSuspend}},
     {kRunning, E::kStop, {kStopping, A::kShutDown}},
     {kRunning, E::kFault, {kFault, A::kShutDown}},
 

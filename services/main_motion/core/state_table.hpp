@@ -27,6 +27,7 @@ enum class Event {
   kRestored,
   kPeerComplete,
   kPeerLost,
+  kInputMissing,
   kStop,
   kOutputsOff,
   kReset,

@@ -21,9 +21,15 @@ std::int64_t ToNs(double s) { return static_cast<std::int64_t>(std::llround(1e9 
 }  // namespace
 
 MainMotionPlant::MainMotionPlant(const PlantTruth& truth, std::uint64_t seed, const SheetTruthSource& sheet)
-    : truth_(truth), random_(seed), sheet_(sheet), p_DJ_mm_(truth.X_DJ().translation_mm()) {
+    : truth_(truth),
+      random_(seed),
+      feeder_random_(seed + 1),
+      sheet_(sheet),
+      p_DJ_mm_(truth.X_DJ().translation_mm()),
+      flow_g_per_min_(truth.pump.abrasive_g_per_min) {
   valves_[static_cast<std::size_t>(main_motion::Valve::kJet)].truth = &truth_.jet_valve;
   valves_[static_cast<std::size_t>(main_motion::Valve::kAbrasive)].truth = &truth_.abrasive_valve;
+  valves_[static_cast<std::size_t>(main_motion::Valve::kAbrasiveFeeder)].truth = &truth_.abrasive_valve;
   holes_W_mm_.reserve(kHoles);
 }
 
@@ -55,17 +61,27 @@ main_motion::MainMotionReadings MainMotionPlant::ReadState(std::int64_t now_ns) 
       pressure_mpa_ + (pressure_mpa_ / truth_.pump.pressure_mpa) * truth_.pump.ripple_mpa *
                           std::sin(2.0 * std::numbers::pi * truth_.pump.ripple_hz * 1e-9 *
                                    static_cast<double>(now_ns % 1'000'000'000'000));
-  readings.abrasive_g_per_min = abrasive.water ? truth_.pump.abrasive_g_per_min : 0.0;
+  readings.abrasive_present = Active(FaultKind::kHopperEmpty, 0) == nullptr;
+  readings.abrasive_g_per_min = abrasive.water && readings.abrasive_present ? flow_g_per_min_ : 0.0;
   readings.stand_off_mm = stand_off_mm_;
   return readings;
 }
 
 void MainMotionPlant::ScheduleOutput(main_motion::Valve valve, bool on, std::int64_t at_ns) {
   const auto v = static_cast<std::size_t>(valve);
-  valves_[v].output = {true, on, at_ns};
+  valves_[v].output = {true, on, at_ns, 0.0};
   if (at_ns <= read_ns_) {
     valves_[v].output.waiting = false;
     Fire(v, on, read_ns_);
+  }
+}
+
+void MainMotionPlant::ScheduleFlow(double abrasive_g_per_min, std::int64_t at_ns) {
+  constexpr auto kFeeder = static_cast<std::size_t>(main_motion::Valve::kAbrasiveFeeder);
+  valves_[kFeeder].output = {true, true, at_ns, abrasive_g_per_min};
+  if (at_ns <= read_ns_) {
+    valves_[kFeeder].output.waiting = false;
+    Fire(kFeeder, true, read_ns_);
   }
 }
 
@@ -124,18 +140,32 @@ void MainMotionPlant::RunPump(double dt_s) {
 // The terminal switches; the water follows. A later command overtakes an earlier one that has not taken effect.
 void MainMotionPlant::Fire(std::size_t valve, bool on, std::int64_t at_ns) {
   ValveLine& line = valves_[valve];
-  const double mean_s = on ? line.truth->on_delay_s : line.truth->off_delay_s;
-  double delay_s = std::max(kShortestDelay * mean_s, mean_s + line.truth->scatter_s * normal_(random_));
-  if (const Fault* fault = Active(FaultKind::kValveDelay, static_cast<int>(valve))) {
-    delay_s += fault->value;
+  const double delay_s = DelayOf(valve, on);
+  if (valve == static_cast<std::size_t>(main_motion::Valve::kAbrasiveFeeder)) {
+    line.effect = {true, true, at_ns + ToNs(delay_s), line.output.flow_g_per_min};
+    return;
   }
   if (line.effect.waiting && line.effect.on != on && line.water == on) {
     line.effect.waiting = false;
     return;
   }
   if (line.water != on) {
-    line.effect = {true, on, at_ns + ToNs(delay_s)};
+    line.effect = {true, on, at_ns + ToNs(delay_s), 0.0};
   }
+}
+
+double MainMotionPlant::DelayOf(std::size_t valve, bool on) {
+  const ValveTruth& truth = *valves_[valve].truth;
+  const double mean_s = on ? truth.on_delay_s : truth.off_delay_s;
+  const double delay_s = std::max(kShortestDelay * mean_s, mean_s + truth.scatter_s * Noise(valve));
+  const Fault* fault = Active(FaultKind::kValveDelay, static_cast<int>(valve));
+  return fault == nullptr ? delay_s : delay_s + fault->value;
+}
+
+double MainMotionPlant::Noise(std::size_t valve) {
+  return valve == static_cast<std::size_t>(main_motion::Valve::kAbrasiveFeeder)
+             ? feeder_normal_(feeder_random_)
+             : normal_(random_);
 }
 
 void MainMotionPlant::RunValves(std::int64_t now_ns, main_motion::MainMotionReadings& readings) {
@@ -147,7 +177,10 @@ void MainMotionPlant::RunValves(std::int64_t now_ns, main_motion::MainMotionRead
           (!line.output.waiting || line.effect.at_ns <= line.output.at_ns || pass == 1)) {
         line.effect.waiting = false;
         line.water = line.effect.on;
-        const std::int64_t seen_ns = line.effect.at_ns + ToNs(line.truth->sensor_s * normal_(random_));
+        if (v == static_cast<std::size_t>(main_motion::Valve::kAbrasiveFeeder)) {
+          flow_g_per_min_ = line.effect.flow_g_per_min;
+        }
+        const std::int64_t seen_ns = line.effect.at_ns + ToNs(line.truth->sensor_s * Noise(v));
         if (readings.effect_count < main_motion::kEffectsPerCycle) {
           readings.effects[readings.effect_count++] = {static_cast<main_motion::Valve>(v), line.water,
                                                        seen_ns};

@@ -1,7 +1,7 @@
 // Stands in for the main-motion module's iron: pump, valves on time-stamped outputs, head, jet and camera.
 //
 // Model: an output fires at its own stamp, or on arrival if that has passed; water follows after the valve's true delay
-// and scatter, and a sensor sees it with its own scatter. The jet's axis is off its head by the stack's tilts and wanders
+// and scatter, and a sensor sees it with its own scatter. A new flow of abrasive takes the way of abrasive that comes on. The jet's axis is off its head by the stack's tilts and wanders
 // a little. Where water comes on, a hole is pierced and remembered in true W. The camera, fixed to the head, reads a mark
 // or hole at p_C = R_DH' (X_DW p_W - p_DH) - p_HC with noise, if one lies in its field of view.
 // Frames: D, H, C, W. Units: mm, s, MPa; common time ns. Threads: one.
@@ -36,6 +36,7 @@ class MainMotionPlant final : public main_motion::MainMotionHardware {
 
   main_motion::MainMotionReadings ReadState(std::int64_t now_ns) override;
   void ScheduleOutput(main_motion::Valve valve, bool on, std::int64_t at_ns) override;
+  void ScheduleFlow(double abrasive_g_per_min, std::int64_t at_ns) override;
   void CancelOutput(main_motion::Valve valve) override;
   void SetPump(bool on) override;
   void SetStandOff(double stand_off_mm) override;
@@ -53,6 +54,7 @@ class MainMotionPlant final : public main_motion::MainMotionHardware {
     bool waiting = false;
     bool on = false;
     std::int64_t at_ns = 0;
+    double flow_g_per_min = 0.0;  // of the feeder
   };
   struct Shot {
     std::uint32_t request = 0;
@@ -79,6 +81,8 @@ class MainMotionPlant final : public main_motion::MainMotionHardware {
 
   void Advance(std::int64_t now_ns);
   void Fire(std::size_t valve, bool on, std::int64_t at_ns);
+  double DelayOf(std::size_t valve, bool on);
+  double Noise(std::size_t valve);
   void RunValves(std::int64_t now_ns, main_motion::MainMotionReadings& readings);
   void RunPump(double dt_s);
   void RunShots(std::int64_t now_ns, main_motion::MainMotionReadings& readings);
@@ -95,6 +99,9 @@ class MainMotionPlant final : public main_motion::MainMotionHardware {
   PlantTruth truth_;
   std::mt19937_64 random_;
   std::normal_distribution<double> normal_;
+  // The feeder's own, so that a run without it is the run it always was.
+  std::mt19937_64 feeder_random_;
+  std::normal_distribution<double> feeder_normal_;
   const SheetTruthSource& sheet_;
   Eigen::Vector2d p_DJ_mm_;
   Eigen::Vector2d wander_mm_ = Eigen::Vector2d::Zero();
@@ -102,6 +109,7 @@ class MainMotionPlant final : public main_motion::MainMotionHardware {
   std::array<ValveLine, main_motion::kValveCount> valves_;
   bool pump_on_ = false;
   double pressure_mpa_ = 0.0;
+  double flow_g_per_min_ = 0.0;
   double stand_off_mm_ = 20.0;
   double stand_off_wanted_mm_ = 20.0;
 

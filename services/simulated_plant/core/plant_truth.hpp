@@ -93,7 +93,14 @@ struct CameraTruth {
   double latency_s = 0.01;        // exposure to reading
 };
 
-enum class FaultKind : std::uint8_t { kStall, kSensorFreeze, kSensorFault, kPressureLoss, kValveDelay };
+enum class FaultKind : std::uint8_t {
+  kStall,
+  kSensorFreeze,
+  kSensorFault,
+  kPressureLoss,
+  kValveDelay,
+  kHopperEmpty
+};
 
 struct Fault {
   FaultKind kind = FaultKind::kStall;

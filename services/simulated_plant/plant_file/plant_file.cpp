@@ -18,8 +18,8 @@ using yaml_file::MapReader;
 constexpr std::size_t kMostFileBytes = 4 << 20;
 constexpr std::size_t kMostEntries = 10'000;
 constexpr int kLargestSeed = 2'000'000'000;
-constexpr std::array<const char*, 5> kFaultNames = {"stall", "sensor_freeze", "sensor_fault", "pressure_loss",
-                                                    "valve_delay"};
+constexpr std::array<const char*, 6> kFaultNames = {"stall",         "sensor_freeze", "sensor_fault",
+                                                    "pressure_loss", "valve_delay",   "hopper_empty"};
 
 // The two visitors have the same members; Visit() below names each key once for both.
 class Reading {
@@ -53,10 +53,11 @@ class Reading {
         return;
       }
     }
-    findings_.Add(map_.prefix() + key, map_.LineOfKey(key),
-                  "is '" + text.substr(0, 64) +
-                      "'; right is stall, sensor_freeze, sensor_fault, pressure_loss or valve_delay",
-                  "WRONG_VALUE");
+    findings_.Add(
+        map_.prefix() + key, map_.LineOfKey(key),
+        "is '" + text.substr(0, 64) +
+            "'; right is stall, sensor_freeze, sensor_fault, pressure_loss, valve_delay or hopper_empty",
+        "WRONG_VALUE");
   }
   template <typename Members>
   void Group(const char* key, Members&& members) {

@@ -57,8 +57,7 @@ ReadOptions ReaderOptionsOf(const MachineDescription& machine, const PlanOptions
   options.compensate_kerf = true;
   options.gcode.default_tolerance_mm = machine.path.corner_tolerance_mm;
   options.gcode.kerf_width_mm = machine.process.kerf_width_mm;
-  options.gcode.abrasive_flow_max_g_per_min = 0.0;  // main motion does not obey them yet
-  options.gcode.process_inputs = false;
+  options.gcode.abrasive_flow_max_g_per_min = machine.process.abrasive_flow_max_g_per_min;
   options.gcode.fault_limit = options.cldata.fault_limit = kFaultLimit;
   return options;
 }
