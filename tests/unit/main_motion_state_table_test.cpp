@@ -44,6 +44,7 @@ const std::vector<Row> kExpected = {
     {kRunning, E::kPeerHeld, {kHolding, A::kSuspend}},
     {kRunning, E::kPeerComplete, {kComplete, A::kFinish}},
     {kRunning, E::kPeerLost, {kHolding, A::kShutDown}},
+    {kRunning, E::kInputMissing, {kHolding, A::kSuspend}},
     {kRunning, E::kStop, {kStopping, A::kShutDown}},
     {kRunning, E::kFault, {kFault, A::kShutDown}},
     {kHolding, E::kPeerHeld, {kHolding, A::kSuspend}},

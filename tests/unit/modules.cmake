@@ -3,4 +3,5 @@ lambdajet_check(simulated_plant_file_test LABELS unit SOURCES simulated_plant_fi
   DEPS simulated_plant_plant_file platform_machine_file)
 lambdajet_check(drive_state_table_test LABELS unit SOURCES drive_state_table_test.cpp DEPS drive_core)
 lambdajet_check(main_motion_state_table_test LABELS unit SOURCES main_motion_state_table_test.cpp DEPS main_motion_core)
-lambdajet_check(modules_behaviour_test LABELS unit SOURCES modules_behaviour_test.cpp DEPS virtual_cell platform_machine_file)
+lambdajet_check(modules_behaviour_test LABELS unit SOURCES modules_behaviour_test.cpp
+  DEPS virtual_cell platform_machine_file trajectory_core)

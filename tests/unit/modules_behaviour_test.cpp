@@ -14,6 +14,7 @@
 #include "tests/support/demo_machine.hpp"
 #include "tests/support/hand_made_plan.hpp"
 #include "tests/support/virtual_cell.hpp"
+#include "trajectory/core/feed/plan_program.hpp"
 
 namespace {
 std::atomic<std::uint64_t> allocations = 0;
@@ -409,6 +410,50 @@ TEST_F(Modules, AResumeRestoresTheFlowOfAbrasive) {
   ASSERT_TRUE(Drive(ModuleMode::kRunning, 10.0));
   EXPECT_EQ(cell_.main_motion().abrasive_g_per_min, 520.0);
   EXPECT_TRUE(cell_.StepUntil([&] { return cell_.main_motion().abrasive_g_per_min == 600.0; }, 5.0));
+}
+
+// From the file to the machine: read, planned, played.
+TEST_F(Modules, AProgramSetsTheFlowAndWaits) {
+  const std::string text =
+      "G0 X200 Y300\nM67 E0 Q410\nM66 P0 L3 Q5\nM3 P0.2\nF3000\nG1 X240\nM67 E0 Q520\nG1 X260 Y310\nM68 E0 "
+      "Q300\nM66 P1 "
+      "L4 Q3\nG1 X280\nM5\nM2\n";
+  const trajectory::PlannedProgram planned = trajectory::PlanPartProgram(text, machine_, {});
+  ASSERT_TRUE(planned.faults.empty()) << planned.faults[0].message;
+  const Plan& plan = planned.plan;
+  ASSERT_EQ(plan.gates.size(), 4u);
+  EXPECT_EQ(plan.gates[0].kind, GateKind::kInput);
+  EXPECT_EQ(plan.gates[0].condition, InputCondition::Of(ProcessInput::kPumpAtPressure, InputEvent::kHigh));
+  EXPECT_EQ(plan.gates[3].condition, InputCondition::Of(ProcessInput::kAbrasivePresent, InputEvent::kLow));
+  EXPECT_EQ(plan.gates[3].argument, 3.0);
+  cell_.Begin(plan);
+  ASSERT_TRUE(cell_.StepUntil([&] { return cell_.drive().gate_waiting == 4; }, 20.0));
+  EXPECT_NEAR(cell_.drive().s_mm, plan.gates[3].s_mm, 1e-6);
+  cell_.Step(0.3);
+  EXPECT_EQ(cell_.main_motion().abrasive_g_per_min, 300.0);
+  cell_.main_motion_plant().Inject({simulated_plant::FaultKind::kHopperEmpty, 0, 0.0, 1.0, 0.0});
+  ASSERT_TRUE(Drive(ModuleMode::kComplete, 10.0));
+  std::vector<std::pair<double, double>> flows;
+  for (const ProcessRecord& record : cell_.Take().process_records) {
+    if (record.action == ProcessAction::kAbrasiveFlow) {
+      flows.emplace_back(record.s_wanted_mm, record.argument);
+      EXPECT_LE(std::abs(record.deviation_mm), 0.1);
+    }
+  }
+  ASSERT_EQ(flows.size(), 3u);
+  EXPECT_EQ(flows[0], std::make_pair(0.0, 410.0));
+  EXPECT_NEAR(flows[1].first, 40.0, 0.1);
+  EXPECT_EQ(flows[1].second, 520.0);
+  EXPECT_EQ(flows[2], std::make_pair(plan.gates[3].s_mm, 300.0));
+
+  // A program that is taken up behind a setting begins with it.
+  trajectory::PlanOptions options;
+  options.start_from_s_mm = 50.0;
+  const trajectory::PlannedProgram rest = trajectory::PlanPartProgram(text, machine_, options);
+  ASSERT_TRUE(rest.faults.empty());
+  ASSERT_FALSE(rest.plan.events.empty());
+  EXPECT_EQ(rest.plan.events.front().action, ProcessAction::kAbrasiveFlow);
+  EXPECT_EQ(rest.plan.events.front().argument, 520.0);
 }
 
 Plan Waiting(const MachineDescription& machine, InputEvent event, double seconds,

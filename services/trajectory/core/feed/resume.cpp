@@ -56,6 +56,22 @@ PathElement RunFrom(const PathElement& run, double offset_mm) {
   return rest;
 }
 
+// What the last setting on the way to an offset within an element asked of the abrasive's feeder, if any did.
+std::optional<PathEvent> FlowAt(const std::vector<PathElement>& elements, std::size_t element,
+                                double offset_mm) {
+  for (std::size_t i = element + 1; i-- > 0;) {
+    const std::vector<PathEvent>& events = elements[i].events;
+    for (auto event = events.rbegin(); event != events.rend(); ++event) {
+      if (event->action == ProcessAction::kAbrasiveFlow && (i < element || event->offset_mm <= offset_mm)) {
+        PathEvent flow = *event;
+        flow.offset_mm = 0.0;
+        return flow;
+      }
+    }
+  }
+  return std::nullopt;
+}
+
 PathElement PierceAt(const PathElement& run, const MachineDescription& machine) {
   PathElement gate;
   gate.kind = ElementKind::kGate;
@@ -83,9 +99,11 @@ std::optional<ProgramPath> PathFrom(const ProgramPath& path, const std::vector<d
   ProgramPath rest;
   const PathElement& here = path.elements[i];
   const double done = wanted - element_begin_s_mm[i];
+  std::optional<PathEvent> flow = FlowAt(path.elements, i, here.length_mm());
   if (here.kind == ElementKind::kRun) {
     const double offset = std::max(0.0, done - options.overlap_mm);
     PathElement run = RunFrom(here, offset);
+    flow = FlowAt(path.elements, i, offset);
     if (JetOnAt(here, offset)) {
       rest.elements.push_back(PierceAt(run, machine));
       run.jet_on = true;
@@ -99,6 +117,9 @@ std::optional<ProgramPath> PathFrom(const ProgramPath& path, const std::vector<d
   }
   rest.elements.insert(rest.elements.end(), path.elements.begin() + static_cast<std::ptrdiff_t>(i) + 1,
                        path.elements.end());
+  if (flow && !rest.elements.empty()) {
+    rest.elements.front().events.insert(rest.elements.front().events.begin(), *flow);
+  }
   return rest.elements.empty() ? std::nullopt : std::optional<ProgramPath>(std::move(rest));
 }
 
