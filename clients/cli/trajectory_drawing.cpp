@@ -10,6 +10,7 @@
 #include "clients/cli/trajectory_drawing_picture.hpp"
 #include "clients/cli/verbs.hpp"
 #include "trajectory/core/part_program/gcode_reader.hpp"
+#include "trajectory/core/part_program/gcode_writer.hpp"
 #include "trajectory/core/toolpath/program_text.hpp"
 #include "trajectory/core/toolpath/start_from_line.hpp"
 #include "trajectory/drawing/dxf_file.hpp"
@@ -252,13 +253,8 @@ absl::Status TellLineStart(const LineVerb& verb, Output& output) {
     return absl::OkStatus();
   }
   if (!verb.out.empty()) {
-    const auto rest =
-        OperationsText(start.operations, verb.program + " from line " + std::to_string(verb.line));
-    if (!rest) {
-      output.Fail(ExitCode::kRefused, "NOT_AS_TEXT", "an arc outside G17 is not written out");
-      return absl::OkStatus();
-    }
-    return WriteTextFile(verb.out, *rest);
+    return WriteTextFile(verb.out, trajectory::WriteGcode(start.operations, verb.program + " from line " +
+                                                                                std::to_string(verb.line)));
   }
   for (std::size_t i = 0; i < start.operations.size(); ++i) {
     output.Text(FormatOperation(start.operations[i]),

@@ -1,7 +1,9 @@
-// CLDATA in and out: writing what was read changes nothing, and a program in G-code makes the same motions as its CLDATA.
+// CLDATA and G-code in and out: writing what was read changes nothing, and a program in G-code makes the same motions as its
+// CLDATA.
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -11,6 +13,7 @@
 #include <sstream>
 
 #include "trajectory/core/part_program/cldata_writer.hpp"
+#include "trajectory/core/part_program/gcode_writer.hpp"
 #include "trajectory/core/part_program/read_program.hpp"
 
 namespace lambdajet::trajectory {
@@ -169,6 +172,138 @@ TEST(CldataLaw, RandomPlanarProgramsComeBack) {
     if (HasFatalFailure()) {
       return;
     }
+  }
+}
+
+// As ExpectSame, and the turns of all three axes.
+void ExpectSameInSixAxes(const std::vector<Operation>& a, const std::vector<Operation>& b) {
+  ExpectSame(a, b, 1e-9);
+  std::vector<Operation> p, q;
+  std::copy_if(a.begin(), a.end(), std::back_inserter(p), Moves);
+  std::copy_if(b.begin(), b.end(), std::back_inserter(q), Moves);
+  ASSERT_EQ(p.size(), q.size());
+  for (std::size_t i = 0; i < p.size(); ++i) {
+    SCOPED_TRACE(FormatOperation(p[i]) + " | " + FormatOperation(q[i]));
+    ASSERT_NEAR(p[i].a_rad, q[i].a_rad, 1e-9);
+    ASSERT_NEAR(p[i].b_rad, q[i].b_rad, 1e-9);
+    ASSERT_NEAR(p[i].c_rad, q[i].c_rad, 1e-9);
+    ASSERT_NEAR(p[i].center_z_W_mm, q[i].center_z_W_mm, p[i].plane == ArcPlane::kXy ? 1e9 : 1e-9);
+    ASSERT_NEAR(p[i].sweep_rad, q[i].sweep_rad, 2e-9);
+  }
+}
+
+TEST(GcodeLaw, RandomPlanarProgramsComeBack) {
+  for (unsigned seed = 1; seed <= 300; ++seed) {
+    SCOPED_TRACE(seed);
+    Draw draw(seed);
+    const std::vector<Operation> list = RandomPlanar(draw);
+    const std::string text = WriteGcode(list, "random");
+    const PartProgram read = ReadGcode(text);
+    ASSERT_TRUE(read.faults.empty()) << read.faults[0].line << " " << read.faults[0].message << "\n" << text;
+    ExpectSame(list, read.operations, 1e-9);
+    EXPECT_EQ(WriteGcode(read.operations, "random"), text);
+    if (HasFailure()) {
+      return;
+    }
+  }
+}
+
+// Lines, arcs and helices of up to three turns in all three planes, both ways, in six axes.
+std::vector<Operation> RandomSpatial(Draw& draw) {
+  std::array<double, 3> at = {draw.In(-100, 100), draw.In(-100, 100), draw.In(-100, 100)};
+  const auto add = [&](OperationKind kind, std::vector<Operation>& list) -> Operation& {
+    Operation& o =
+        list.emplace_back(At(kind, at[0], at[1], kind == OperationKind::kTraverse ? 0 : draw.In(1, 200)));
+    o.axes = kSixAxes;
+    o.z_W_mm = at[2];
+    o.a_rad = draw.In(-kPi, kPi);
+    o.b_rad = draw.In(-1, 1);
+    o.c_rad = draw.In(-kPi, kPi);
+    return o;
+  };
+  std::vector<Operation> list;
+  add(OperationKind::kTraverse, list);
+  for (int i = 0; i < 40; ++i) {
+    if (draw.Of(4) == 0) {
+      at = {draw.In(-100, 100), draw.In(-100, 100), draw.In(-100, 100)};
+      add(OperationKind::kFeedLine, list);
+      continue;
+    }
+    const int plane = draw.Of(3);
+    const std::size_t u = plane == 0 ? 0 : plane == 1 ? 2 : 1, v = (u + 1) % 3, normal = (u + 2) % 3;
+    const double radius = draw.In(0.1, 200), angle = draw.In(-kPi, kPi);
+    const bool whole = draw.Of(5) == 0;
+    const double sweep =
+        (draw.Of(2) == 0 ? 1 : -1) * (whole ? 2 * kPi * (1 + draw.Of(3)) : draw.In(1e-3, 6 * kPi));
+    std::array<double, 3> center = at;
+    center[u] -= radius * std::cos(angle);
+    center[v] -= radius * std::sin(angle);
+    if (!whole) {
+      at[u] = center[u] + radius * std::cos(angle + sweep);
+      at[v] = center[v] + radius * std::sin(angle + sweep);
+    }
+    at[normal] += draw.Of(2) == 0 ? draw.In(-20, 20) : 0.0;
+    Operation& o = add(OperationKind::kFeedArc, list);
+    o.plane = static_cast<ArcPlane>(plane);
+    o.center_x_W_mm = center[0];
+    o.center_y_W_mm = center[1];
+    o.center_z_W_mm = center[2];
+    o.sweep_rad = sweep;
+  }
+  list.push_back(At(OperationKind::kEnd, 0, 0, 0));
+  return list;
+}
+
+TEST(GcodeLaw, ArcsAndHelicesInAllPlanesComeBack) {
+  GcodeOptions six;
+  six.axes = kSixAxes;
+  for (unsigned seed = 1; seed <= 300; ++seed) {
+    SCOPED_TRACE(seed);
+    Draw draw(seed);
+    std::vector<Operation> list = RandomSpatial(draw);
+    const std::string text = WriteGcode(list, "random");
+    const PartProgram read = ReadGcode(text, six);
+    ASSERT_TRUE(read.faults.empty()) << read.faults[0].line << " " << read.faults[0].message << "\n" << text;
+    list.back() = read.operations.back();
+    ExpectSameInSixAxes(list, read.operations);
+    if (HasFatalFailure()) {
+      return;
+    }
+  }
+}
+
+// Planes, inch, increments, timed feeds and turns by words of a shop, not by our own writer.
+TEST(GcodeLaw, WhatAShopWroteComesBackWhateverItsModes) {
+  GcodeOptions six;
+  six.axes = kSixAxes;
+  const PartProgram first = ReadGcode(
+      "G20 G91 G18\nG0 X1 Y1 Z1\nF10\nG2 X0.5 Z0.5 I0.5 K0 Y0.3\nG3 X0 Z0 I0.25 K0 P3 A10\nG19 G2 Y0.2 Z0.2 "
+      "R0.2 "
+      "B5\nG93 G3 Y0 Z0 J0.1 K0.1 X0.1 F4\nG17 G2 X1 Y0 I0.5 J0 Z-0.2 F2\nG1 A20 C3 F3\nG94 G1 X1 F20\nG21 "
+      "G90 G18 G3 X5 "
+      "Z5 R60 "
+      "C-30 F600\nM2\n",
+      six);
+  ASSERT_TRUE(first.faults.empty()) << first.faults[0].line << " " << first.faults[0].message;
+  const std::string text = WriteGcode(first.operations, "shop");
+  const PartProgram second = ReadGcode(text, six);
+  ASSERT_TRUE(second.faults.empty()) << second.faults[0].line << " " << second.faults[0].message << "\n"
+                                     << text;
+  ExpectSameInSixAxes(first.operations, second.operations);
+  EXPECT_EQ(WriteGcode(second.operations, "shop"), text);
+  for (const char* word : {"G18\n", "G19\n", "G17\n", " P3", " K", " J", "G93\n", "G94 F"}) {
+    EXPECT_NE(text.find(word), std::string::npos) << word;
+  }
+}
+
+// The end of an arc that is shorter than the reader's grain must not become a full turn.
+TEST(GcodeLaw, AnArcOfNoLengthIsNoTurn) {
+  Operation start = At(OperationKind::kTraverse, 100, 0, 0), arc = At(OperationKind::kFeedArc, 100, 0, 10);
+  arc.sweep_rad = 1e-13;
+  const PartProgram read = ReadGcode(WriteGcode({start, arc}, "short"));
+  ASSERT_TRUE(read.faults.empty()) << read.faults[0].message;
+  for (const Operation& o : read.operations) {
+    EXPECT_NE(o.kind, OperationKind::kFeedArc);
   }
 }
 

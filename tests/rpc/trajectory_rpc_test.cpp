@@ -329,18 +329,38 @@ TEST_F(TrajectoryServiceTest, APlanWrittenOutIsPlannedTheSame) {
   }
 }
 
-TEST_F(TrajectoryServiceTest, APlanOfALargeProgramIsNotKeptAsText) {
-  std::string program;
-  while (program.size() <= PlanDesk::kMostKeptBytes) {
-    program += "(" + std::string(60, 'x') + ")\n";
+TEST_F(TrajectoryServiceTest, APlanOfALargeProgramIsWrittenOutInPieces) {
+  std::string program = "G21 G90\nG0 X200 Y200\nM3 P0.3\nF6000\n";
+  for (int i = 0; program.size() <= PlanDesk::kMostKeptBytes; ++i) {
+    program +=
+        "G1 X" + std::to_string(200.0 + 0.001 * (i % 40000)) + " Y200 (" + std::string(50, 'x') + ")\n";
   }
-  const auto plan = PlanAndWait(program + kPlate);
+  program += "M5\nM2\n";
+  const auto plan = PlanAndWait(program);
   ASSERT_EQ(plan.operation().state(), type::v1::OPERATION_STATE_DONE) << plan.DebugString();
-  v1::ExportRequest file;
-  file.set_plan_id(plan.summary().plan_id());
-  file.set_format(v1::ExportRequest::FORMAT_GCODE);
-  std::string text;
-  EXPECT_EQ(TroubleReason(ExportAll(file, text)), "PROGRAM_NOT_KEPT");
+  const auto pieces = [this](const v1::ExportRequest& request) {
+    grpc::ClientContext context;
+    SetDeadline(context, 60.0);
+    const auto stream = stub_->Export(&context, request);
+    std::vector<std::string> all;
+    for (v1::ExportPiece piece; stream->Read(&piece);) {
+      EXPECT_LE(piece.content().size(), 1u << 20);
+      all.push_back(piece.content());
+    }
+    EXPECT_TRUE(stream->Finish().ok());
+    return all;
+  };
+  for (const auto as : {v1::ExportRequest::FORMAT_GCODE, v1::ExportRequest::FORMAT_CLDATA,
+                        v1::ExportRequest::FORMAT_CANONICAL}) {
+    v1::ExportRequest of_plan, of_program;
+    of_plan.set_plan_id(plan.summary().plan_id());
+    of_plan.set_format(as);
+    of_program.set_program(program);
+    of_program.set_format(as);
+    const auto kept = pieces(of_plan);
+    EXPECT_GE(kept.size(), 2u);
+    EXPECT_EQ(kept, pieces(of_program)) << v1::ExportRequest::Format_Name(as);
+  }
 }
 
 TEST_F(TrajectoryServiceTest, ADrawingThatCannotBeCutIsRefusedWithItsLines) {

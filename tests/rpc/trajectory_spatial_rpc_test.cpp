@@ -218,6 +218,28 @@ TEST_F(SpatialServiceTest, ListsAndWritesProgramsInSixAxes) {
   EXPECT_EQ(TroubleReason(status), "AXIS_NOT_WRITABLE");
 }
 
+// Arcs in every plane of a hexapod's plan, as G-code over the wire and planned again.
+TEST_F(SpatialServiceTest, WritesArcsInEveryPlaneAsGcode) {
+  const auto plan = PlanAndWait(
+      "G21 G90\nG0 X0 Y0 Z30\nF1200\nG18 G2 X10 Z30 I5 K0 Y3\nG19 G3 Y10 Z30 J3.5 K0\nG17 G2 X0 Y0 R12 "
+      "Z28\nG18 G3 "
+      "X0 Z28 I2 K2 P2\nM2\n");
+  ASSERT_EQ(plan.operation().state(), type::v1::OPERATION_STATE_DONE) << plan.DebugString();
+  v1::ExportRequest as_gcode;
+  as_gcode.set_format(v1::ExportRequest::FORMAT_GCODE);
+  as_gcode.set_plan_id(plan.summary().plan_id());
+  std::string gcode;
+  const absl::Status status = ExportAll(as_gcode, gcode);
+  ASSERT_TRUE(status.ok()) << status;
+  for (const char* plane : {"G18\n", "G19\n", "G17\n"}) {
+    EXPECT_NE(gcode.find(plane), std::string::npos) << gcode;
+  }
+  const auto again = PlanAndWait(gcode);
+  ASSERT_EQ(again.operation().state(), type::v1::OPERATION_STATE_DONE) << again.DebugString();
+  EXPECT_NEAR(again.summary().duration_s(), plan.summary().duration_s(), 1e-6);
+  EXPECT_NEAR(again.summary().length_mm(), plan.summary().length_mm(), 1e-6);
+}
+
 TEST_F(SpatialServiceTest, RefusesWithStepReasonValueAndLine) {
   struct Wrong {
     const char* program;

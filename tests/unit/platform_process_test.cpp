@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 #include <pthread.h>
 #include <signal.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 
 #include <atomic>
@@ -12,6 +13,7 @@
 #include "foundation/contract/trouble.hpp"
 #include "platform/process/atomic_file.hpp"
 #include "platform/process/common_clock.hpp"
+#include "platform/process/kept_text.hpp"
 #include "platform/process/periodic_loop.hpp"
 #include "platform/process/stop_signal.hpp"
 #include "tests/support/temporary_folder.hpp"
@@ -154,6 +156,33 @@ TEST(AtomicFile, ReplacesWholeAndLeavesNothingBehind) {
   ASSERT_TRUE(WriteFileAtomically(path, std::string(100'000, 'x')).ok());
   EXPECT_EQ(*ReadWholeFile(path, 1 << 20), std::string(100'000, 'x'));
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 1);
+}
+
+TEST(KeptText, IsReadBackWhereverItIsKept) {
+  std::string text(3u << 20, 'x');
+  text[70000] = '\0';
+  const KeptText in_memory(text, text.size()), in_file(text, text.size() - 1);
+  EXPECT_FALSE(in_memory.in_file());
+  EXPECT_TRUE(in_file.in_file());
+  for (const KeptText* kept : {&in_memory, &in_file, &in_file}) {
+    EXPECT_EQ(kept->size(), text.size());
+    const auto read = kept->Read();
+    ASSERT_TRUE(read.ok()) << read.status();
+    EXPECT_TRUE(*read == text);
+  }
+  EXPECT_EQ(*KeptText().Read(), "");
+}
+
+TEST(KeptText, StaysInMemoryWhereNoFileIsToBeHad) {
+  rlimit before{};
+  ASSERT_EQ(getrlimit(RLIMIT_NOFILE, &before), 0);
+  rlimit none = before;
+  none.rlim_cur = 0;
+  ASSERT_EQ(setrlimit(RLIMIT_NOFILE, &none), 0);
+  const KeptText kept("a text", 0);
+  ASSERT_EQ(setrlimit(RLIMIT_NOFILE, &before), 0);
+  EXPECT_FALSE(kept.in_file());
+  EXPECT_EQ(*kept.Read(), "a text");
 }
 
 TEST(AtomicFile, SaysWhatIsInTheWay) {

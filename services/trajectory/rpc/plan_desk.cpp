@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <utility>
 
 #include "accuracy/core/prediction.hpp"
 
@@ -107,10 +108,11 @@ void PlanDesk::Work(const std::shared_ptr<PlanRecord>& record) {
 void PlanDesk::Settle(const std::shared_ptr<PlanRecord>& record,
                       std::shared_ptr<const PlannedProgram> planned,
                       std::chrono::steady_clock::time_point begin) {
-  if (record->program.size() > kMostKeptBytes) {
-    std::string().swap(record->program);
-  }
   const bool done = planned->faults.empty();
+  std::string program = std::exchange(record->program, {});
+  if (done) {
+    record->kept = KeptText(std::move(program), kMostKeptBytes);
+  }
   record->planned = std::move(planned);
   record->progress = 1.0;
   {

@@ -1,7 +1,8 @@
 // Keeps plans as resources: begun, watched, cancelled, found again by id.
 //
 // Model: one plan an id; the same request under the same machine finds the plan that is there. Planning runs on threads of
-// its own; finished plans stay until kMostPlans others are newer (one that is being streamed is not given up).
+// its own; finished plans stay until kMostPlans others are newer (one that is being streamed is not given up), each with its
+// program, so that it can be written out.
 // Units: s, mm. Threads: any. Errors: RESOURCE_EXHAUSTED OVERLOADED when too many plans wait.
 #pragma once
 
@@ -17,6 +18,7 @@
 
 #include "absl/status/statusor.h"
 #include "foundation/machine/machine_description.hpp"
+#include "platform/process/kept_text.hpp"
 #include "platform/rpc/work_pool.hpp"
 #include "platform/telemetry/metrics.hpp"
 #include "trajectory/core/spatial_feed/spatial_program.hpp"
@@ -33,7 +35,8 @@ struct PlanRecord {
   std::uint64_t number = 0;  // counts up; newest is highest
   std::shared_ptr<const MachineDescription> machine;
   PlanOptions options;
-  std::string program;  // one of more than kMostKeptBytes is given up when planning ends
+  std::string program;  // until planning ends
+  KeptText kept;        // the same after it, of a plan that is done
   std::atomic<PlanState> state = PlanState::kRunning;
   std::atomic<double> progress = 0.0;
   std::atomic<bool> cancel = false;
@@ -49,7 +52,8 @@ struct PlanRecord {
 class PlanDesk {
  public:
   static constexpr std::size_t kMostPlans = 12;
-  static constexpr std::size_t kMostKeptBytes = 2u << 20;  // so that a plan can be written out as a program
+  static constexpr std::size_t kMostKeptBytes =
+      2u << 20;  // of a program in memory; longer ones are kept in a file
 
   explicit PlanDesk(Metrics& metrics);
 

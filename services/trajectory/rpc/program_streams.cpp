@@ -3,17 +3,19 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <utility>
 
 #include "foundation/contract/trouble.hpp"
 #include "trajectory/core/feed/plan_samples.hpp"
 #include "trajectory/core/part_program/cldata_writer.hpp"
-#include "trajectory/core/toolpath/program_text.hpp"
+#include "trajectory/core/part_program/gcode_writer.hpp"
 #include "trajectory/rpc/answer_limits.hpp"
 
 namespace lambdajet::trajectory {
 namespace {
 
 constexpr std::size_t kOperationsPerBatch = 5000;
+constexpr std::string_view kLost = "KEPT_TEXT_UNREADABLE";
 constexpr const char* kSampleHeader =
     "tau_s,s_mm,x_W_mm,y_W_mm,vx_W_mm_per_s,vy_W_mm_per_s,ax_W_mm_per_s2,ay_W_mm_per_s2,"
     "actuator_1_mm,actuator_2_mm,actuator_1_mm_per_s,actuator_2_mm_per_s,cutting,source_line\n";
@@ -35,6 +37,9 @@ struct Listing {
 };
 
 absl::Status FaultStatus(const ProgramFault& fault) {
+  if (fault.reason == kLost) {
+    return Trouble(absl::StatusCode::kDataLoss, fault.reason, fault.message);
+  }
   return Trouble(absl::StatusCode::kFailedPrecondition, std::string(fault.reason),
                  "line " + std::to_string(fault.line) + ": " + fault.message);
 }
@@ -56,6 +61,15 @@ void AppendSample(const FullSample& s, std::string& csv) {
 }  // namespace
 
 PartProgram ReadListed(ListedProgram listed) {
+  if (listed.plan != nullptr) {
+    absl::StatusOr<std::string> kept = listed.plan->kept.Read();
+    if (!kept.ok()) {
+      PartProgram lost;
+      lost.faults.push_back({0, 0, kLost, "", std::string(kept.status().message())});
+      return lost;
+    }
+    listed.program.text = *std::move(kept);
+  }
   if (listed.hexapod != nullptr) {
     return ReadSpatialProgram(listed.program.text, listed.hexapod->motion, listed.program.notation);
   }
@@ -112,38 +126,53 @@ Source<v1::ExportPiece> CanonicalPieces(ListedProgram program) {
   };
 }
 
-absl::StatusOr<std::string> Written(const PartProgram& read, v1::ExportRequest::Format format, bool hexapod) {
+Source<v1::ExportPiece> GcodePieces(ListedProgram program) {
+  struct Writing {
+    Listing listing;
+    GcodeWriter writer{"exported by lambdajet"};
+    bool ended = false;
+  };
+  return [writing = std::make_shared<Writing>(Writing{Listing(std::move(program))})](
+             v1::ExportPiece& piece) -> absl::StatusOr<bool> {
+    writing->listing.Read();
+    const PartProgram& read = writing->listing.program;
+    if (!read.faults.empty()) {
+      return FaultStatus(read.faults.front());
+    }
+    GcodeWriter& writer = writing->writer;
+    while (writer.size() < kBytesPerPiece && writing->listing.next < read.operations.size()) {
+      writer.Append(read.operations[writing->listing.next++]);
+    }
+    if (writing->listing.next == read.operations.size() && !std::exchange(writing->ended, true)) {
+      writer.End();
+    }
+    piece.set_content(writer.Take());
+    return !piece.content().empty();
+  };
+}
+
+absl::StatusOr<std::string> WrittenCldata(ListedProgram listed) {
+  const bool hexapod = listed.hexapod != nullptr;
+  const PartProgram read = ReadListed(std::move(listed));
   if (!read.faults.empty()) {
     return FaultStatus(read.faults.front());
   }
-  if (format == v1::ExportRequest::FORMAT_CLDATA) {
-    CldataText cldata = WriteCldata(read.operations, "exported by lambdajet", {},
-                                    hexapod ? ToolAngles::kRollPitch : ToolAngles::kRotaryHead);
-    return cldata.faults.empty() ? absl::StatusOr<std::string>(std::move(cldata.text))
-                                 : FaultStatus(cldata.faults.front());
-  }
-  std::optional<std::string> gcode = OperationsText(read.operations, "exported by lambdajet");
-  return gcode ? absl::StatusOr<std::string>(std::move(*gcode))
-               : Trouble(absl::StatusCode::kFailedPrecondition, "NOT_WRITABLE",
-                         "G-code as it is written here has no words for an arc outside G17");
+  CldataText cldata = WriteCldata(read.operations, "exported by lambdajet", {},
+                                  hexapod ? ToolAngles::kRollPitch : ToolAngles::kRotaryHead);
+  return cldata.faults.empty() ? absl::StatusOr<std::string>(std::move(cldata.text))
+                               : FaultStatus(cldata.faults.front());
 }
 
-}  // namespace
-
-Source<v1::ExportPiece> ProgramPieces(ListedProgram program, v1::ExportRequest::Format format) {
-  if (format == v1::ExportRequest::FORMAT_CANONICAL) {
-    return CanonicalPieces(std::move(program));
-  }
+Source<v1::ExportPiece> CldataPieces(ListedProgram program) {
   struct Writing {
     ListedProgram listed;
     std::optional<std::string> text;
     std::size_t next = 0;
   };
-  return [format, writing = std::make_shared<Writing>(Writing{std::move(program), std::nullopt})](
+  return [writing = std::make_shared<Writing>(Writing{std::move(program), std::nullopt})](
              v1::ExportPiece& piece) -> absl::StatusOr<bool> {
     if (!writing->text) {
-      const bool hexapod = writing->listed.hexapod != nullptr;
-      auto text = Written(ReadListed(std::move(writing->listed)), format, hexapod);
+      auto text = WrittenCldata(std::move(writing->listed));
       if (!text.ok()) {
         return text.status();
       }
@@ -153,6 +182,14 @@ Source<v1::ExportPiece> ProgramPieces(ListedProgram program, v1::ExportRequest::
     writing->next += piece.content().size();
     return !piece.content().empty();
   };
+}
+
+}  // namespace
+
+Source<v1::ExportPiece> ProgramPieces(ListedProgram program, v1::ExportRequest::Format format) {
+  return format == v1::ExportRequest::FORMAT_CANONICAL ? CanonicalPieces(std::move(program))
+         : format == v1::ExportRequest::FORMAT_GCODE   ? GcodePieces(std::move(program))
+                                                       : CldataPieces(std::move(program));
 }
 
 Source<v1::ExportPiece> SamplePieces(std::shared_ptr<const PlannedProgram> planned, double step_s) {

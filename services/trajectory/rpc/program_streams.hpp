@@ -20,12 +20,13 @@ struct ListedProgram {
   SubmittedProgram program;
   std::shared_ptr<const MachineDescription> machine;
   std::shared_ptr<const HexapodModel> hexapod;  // set: the program is one of its
+  std::shared_ptr<const PlanRecord> plan;       // set: its program, not the text above
 };
 
 Source<v1::OperationBatch> OperationBatches(ListedProgram program);
 
 // As canonical list, G-code or CLDATA. A program with faults ends the stream with FAILED_PRECONDITION and the first one's
-// reason; one that the format has no words for with NOT_WRITABLE or the writer's reason.
+// reason; one that CLDATA has no words for with the writer's; one that is kept and cannot be read with DATA_LOSS.
 Source<v1::ExportPiece> ProgramPieces(ListedProgram program, v1::ExportRequest::Format format);
 
 Source<v1::ExportPiece> SamplePieces(std::shared_ptr<const PlannedProgram> planned, double step_s);

@@ -285,7 +285,7 @@ absl::StatusOr<ListedProgram> TrajectoryRpc::ListedOf(const Wire& wire) const {
   if (!hexapod.ok() || (*hexapod != nullptr && program->drawing)) {
     return hexapod.ok() ? DrawingForHexapod() : hexapod.status();
   }
-  return ListedProgram{std::move(*program), find_machine_(std::nullopt), std::move(*hexapod)};
+  return ListedProgram{std::move(*program), find_machine_(std::nullopt), std::move(*hexapod), nullptr};
 }
 
 grpc::ServerUnaryReactor* TrajectoryRpc::ListOperations(grpc::CallbackServerContext* context,
@@ -365,20 +365,14 @@ absl::StatusOr<ListedProgram> TrajectoryRpc::ExportedProgram(const v1::ExportReq
     if (*hexapod != nullptr && program->drawing) {
       return DrawingForHexapod();
     }
-    return ListedProgram{std::move(*program), find_machine_(std::nullopt), std::move(*hexapod)};
+    return ListedProgram{std::move(*program), find_machine_(std::nullopt), std::move(*hexapod), nullptr};
   }
   const auto record = DonePlan(request.plan_id());
   if (!record.ok()) {
     return record.status();
   }
-  if ((*record)->program.empty()) {
-    return Trouble(absl::StatusCode::kFailedPrecondition, "PROGRAM_NOT_KEPT",
-                   "the program of this plan is larger than " + std::to_string(PlanDesk::kMostKeptBytes) +
-                       " bytes and is not kept; send it as `program`");
-  }
-  return ListedProgram{{(*record)->program, (*record)->options.notation, std::nullopt},
-                       (*record)->machine,
-                       (*record)->hexapod};
+  return ListedProgram{
+      {{}, (*record)->options.notation, std::nullopt}, (*record)->machine, (*record)->hexapod, *record};
 }
 
 grpc::ServerWriteReactor<v1::ExportPiece>* TrajectoryRpc::Export(grpc::CallbackServerContext* context,
