@@ -2,7 +2,10 @@
 // step, a wider tolerance does not cost time, and what cannot be held is refused where and why.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <tuple>
+#include <vector>
 
 #include "tests/laws/trajectory_cases.hpp"
 #include "trajectory/core/tolerance/judged_contour.hpp"
@@ -184,6 +187,42 @@ TEST(FeedFromTolerance, IsTheSameBitByBitAndResumes) {
   ASSERT_TRUE(rest.planned.faults.empty()) << FirstFault(rest);
   EXPECT_LT(rest.planned.plan.duration_s, once.planned.plan.duration_s);
   EXPECT_NE(rest.planned.plan.id, once.planned.plan.id);
+}
+
+// Asked all the time while the work goes on, so that the count of questions stands for time, if roughly: drawing asks oftener
+// than planning.
+TEST(FeedFromTolerance, ProgressGrowsEvenlyAndEndsAtOne) {
+  const MachineDescription machine = IdentifiedMachine();
+  for (const unsigned seed : {2u, 5u}) {
+    const std::string program = RandomProgram(seed).Make();
+    for (const auto& [tolerance, compensate, resume] :
+         {std::tuple(0.2, false, false), {0.1, false, true}, {0.06, false, false}, {0.05, true, false}}) {
+      PlanOptions options = Holding(tolerance, compensate);
+      if (resume) {
+        options.start_from_s_mm = 10.0;
+      }
+      std::vector<double> told;
+      const TolerancePlan answer = PlanToTolerance(program, machine, options, [&told](double ratio) {
+        told.push_back(ratio);
+        return true;
+      });
+      ASSERT_TRUE(answer.planned.faults.empty()) << FirstFault(answer);
+      EXPECT_TRUE(std::is_sorted(told.begin(), told.end()));
+      EXPECT_EQ(told.back(), 1.0);
+      EXPECT_GE(told.front(), 0.0);
+      const auto count = static_cast<double>(told.size());
+      double stands = 0.0, longest = 0.0, jump = told.front(), off = 0.0;
+      for (std::size_t i = 1; i < told.size(); ++i) {
+        stands = told[i] == told[i - 1] ? stands + 1.0 : 0.0;
+        longest = std::max(longest, stands / count);
+        jump = std::max(jump, told[i] - told[i - 1]);
+        off = std::max(off, std::abs(told[i] - static_cast<double>(i) / count));
+      }
+      EXPECT_LE(longest, 1.0 / 3.0);
+      EXPECT_LE(jump, 1.0 / 3.0);
+      EXPECT_LE(off, 0.5);
+    }
+  }
 }
 
 TEST(FeedFromTolerance, RefusesWishesThatMeanNothing) {

@@ -13,12 +13,18 @@ constexpr std::size_t kPlanThreads = 1;
 constexpr std::size_t kMostPlansWaiting = 16;
 constexpr int kDraws = 200;
 
+// Of the work: planning is most of it where the feed is found from a tolerance, about half where it is not.
+double PlanningShare(const PlanOptions& options) { return options.hold.empty() ? 0.5 : 0.97; }
+
 // Without an answer where nothing is cut.
-double PredictedBound(const MachineDescription& machine, const PlannedProgram& planned,
-                      const std::atomic<bool>& cancel) {
+double PredictedBound(const MachineDescription& machine, const PlannedProgram& planned, PlanRecord& record) {
   accuracy::PredictionOptions options;
   options.draws = kDraws;
-  options.cancelled = [&cancel] { return cancel.load(); };
+  const double begin = record.progress;
+  options.cancelled = [&record, begin, drawn = 0]() mutable {
+    record.progress = begin + (1.0 - begin) * std::min(1.0, static_cast<double>(drawn++) / kDraws);
+    return record.cancel.load();
+  };
   const auto prediction = accuracy::Predict(machine, planned.samples, planned.plan.compensated, options);
   return prediction.reason == accuracy::PredictionReason::kPredicted ? prediction.predicted_95_mm : 0.0;
 }
@@ -92,15 +98,16 @@ void PlanDesk::Work(const std::shared_ptr<PlanRecord>& record) {
   auto planned = std::make_shared<PlannedProgram>();
   if (!record->cancel) {
     TolerancePlan answer =
-        PlanToTolerance(record->program, *record->machine, record->options, [&record](double progress) {
-          record->progress = std::max(record->progress.load(), 0.9 * progress);  // a search may begin anew
-          return !record->cancel;
-        });
+        PlanToTolerance(record->program, *record->machine, record->options,
+                        [&record, share = PlanningShare(record->options)](double progress) {
+                          record->progress = share * progress;
+                          return !record->cancel;
+                        });
     *planned = std::move(answer.planned);
     record->tolerance = std::move(answer.report);
   }
   if (planned->faults.empty() && !record->cancel) {
-    record->predicted_95_mm = PredictedBound(*record->machine, *planned, record->cancel);
+    record->predicted_95_mm = PredictedBound(*record->machine, *planned, *record);
   }
   Settle(record, std::move(planned), begin);
 }

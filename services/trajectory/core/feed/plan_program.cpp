@@ -380,7 +380,12 @@ ProgramPath LayOutProgram(std::string_view program, const MachineDescription& ma
 PlannedProgram PlanLaidOutProgram(const ProgramPath& path, const MachineDescription& machine,
                                   const PlanOptions& options, const PlanProgress& progress) {
   const PlanningModel model(machine, options);
-  PlannedProgram result = PlanPath(path, model, progress);
+  const double part =
+      options.start_from_s_mm ? 0.5 : 1.0;  // of the work: the whole first, then what is left of it
+  const auto of_part = [&progress, part](double before) -> PlanProgress {
+    return [&progress, part, before](double share) { return !progress || progress(before + part * share); };
+  };
+  PlannedProgram result = PlanPath(path, model, of_part(0.0));
   if (result.faults.empty() && options.start_from_s_mm) {
     const std::optional<ProgramPath> rest =
         PathFrom(path, result.element_begin_s_mm, result.plan.length_mm, options, machine);
@@ -390,7 +395,7 @@ PlannedProgram PlanLaidOutProgram(const ProgramPath& path, const MachineDescript
           {0, 0, "START_BEYOND_END", "start_from_s_mm", "nothing of the program is left to cut from there"});
       return result;
     }
-    result = PlanPath(*rest, model, progress);
+    result = PlanPath(*rest, model, of_part(part));
   }
   return result;
 }

@@ -293,7 +293,7 @@ JudgedContour JudgeContour(const MachineDescription& machine, const ProgramPath&
 }
 
 bool PredictGroups(const MachineDescription& machine, const PlannedProgram& planned, JudgedContour& judged,
-                   const std::function<bool()>& cancelled) {
+                   const std::function<bool(double)>& cancelled) {
   ContourModel model(machine);
   std::uint32_t blame_line = 0;
   const auto points =
@@ -308,7 +308,7 @@ bool PredictGroups(const MachineDescription& machine, const PlannedProgram& plan
   accuracy::DrawSpace space(model);
   std::vector<std::vector<double>> drawn(judged.groups.size());
   for (int d = 0; d < kDraws; ++d) {
-    if (cancelled && cancelled()) {
+    if (cancelled && cancelled(static_cast<double>(d) / kDraws)) {
       return false;
     }
     accuracy::DrawContour(model, 1, static_cast<std::uint64_t>(d), space);

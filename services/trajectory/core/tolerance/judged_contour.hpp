@@ -89,9 +89,10 @@ JudgedContour JudgeContour(const MachineDescription& machine, const ProgramPath&
                            const PlannedProgram& planned, const std::vector<ToleranceWish>& wishes,
                            const Widening& widening);
 
-// Sets every group's predicted 95th percentile by seeded draws. False if cancelled.
+// Sets every group's predicted 95th percentile by seeded draws. `cancelled` is asked before each, with the share that is drawn;
+// false if it said so.
 bool PredictGroups(const MachineDescription& machine, const PlannedProgram& planned, JudgedContour& judged,
-                   const std::function<bool()>& cancelled);
+                   const std::function<bool(double)>& cancelled);
 
 // The 95 % bound of a place at `pace` times the present one, with its group's widening.
 double BoundAt(const JudgedPlace& place, double widening, double pace);

@@ -28,6 +28,19 @@ constexpr double kCounts = 0.2;          // of the moving mean square
 constexpr std::array<double, 4> kRises = {1.08, 1.04, 1.02, kLastRise};
 constexpr int kMostRises = 6;  // of one size
 
+// Passes that programs take; what is said of progress rests on it, nothing else.
+constexpr double kPlanningShare = 0.8;  // of a pass, the rest is judging
+constexpr double kBestOnceMore = 1.0;
+constexpr double kExploredAgain = 6.0;  // half of the programs are explored once more
+constexpr double kPlacesTaken = 2.0;
+constexpr double kDownTaken = 1.0;
+constexpr double kRaisesTaken = 4.0;
+constexpr double kDrawing = 1.0;
+constexpr double kFinishTaken = 1.0 + kPlacesTaken + kDownTaken + kRaisesTaken + kDownTaken + kDrawing;
+
+// Of a stage that may take longer than it mostly does.
+double Left(double expected) { return std::max(1.0, expected); }
+
 double RunLength(const ProgramPath& path) {
   double run_mm = 0.0;
   for (const PathElement& e : path.elements) {
@@ -70,18 +83,17 @@ std::vector<double> Smoothed(const std::vector<double>& factor) {
 }  // namespace
 
 PaceSearch::PaceSearch(const ProgramPath& path, const MachineDescription& machine, const PlanOptions& options,
-                       const PlanProgress& progress)
+                       PassProgress& progress)
     : path_(path), machine_(machine), options_(options), progress_(progress) {
   best_pace_ = FullPace(path);
 }
 
-bool PaceSearch::Try(const Pace& pace) {
-  const double done = std::min(0.95, 1.0 - std::exp(-0.05 * plans_));
-  const PlanProgress wanted = [this, done](double) { return !progress_ || progress_(done); };
-  if (!wanted(0.0)) {
+bool PaceSearch::Try(const Pace& pace, double left) {
+  if (!progress_.Begin(left)) {
     cancelled_ = true;
     return false;
   }
+  const PlanProgress wanted = [this](double share) { return progress_.Within(kPlanningShare * share); };
   now_.pace = pace;
   options_.pace = std::make_shared<const Pace>(pace);
   ++plans_;
@@ -250,7 +262,7 @@ bool PaceSearch::Settled() const {
 
 bool PaceSearch::BothWays(double rise, int rounds) {
   for (int round = 0; round < rounds && !Settled(); ++round, rise *= kRiseFades) {
-    if (!Try(Changed(1.0 + rise))) {
+    if (!Try(Changed(1.0 + rise), Left(rounds - round) + kBestOnceMore + after_)) {
       return false;
     }
     KeepBest();
@@ -273,7 +285,7 @@ bool PaceSearch::SlowPlaces() {
     if (std::all_of(contours_.begin(), contours_.end(), [](const Contour& c) { return c.best.holds; })) {
       break;
     }
-    if (!Try(Changed(1.0))) {
+    if (!Try(Changed(1.0), Left(kPlacesTaken - round) + kDownTaken + kRaisesTaken + after_)) {
       return false;
     }
     KeepBest();
@@ -281,9 +293,9 @@ bool PaceSearch::SlowPlaces() {
   return true;
 }
 
-bool PaceSearch::SlowWholeContours() {
+bool PaceSearch::SlowWholeContours(double after) {
   for (int round = 0; round < kRoundsDown; ++round) {
-    if (!Try(best_pace_)) {
+    if (!Try(best_pace_, Left(kDownTaken - round) + after)) {
       return false;
     }
     if (now_.judged.holds) {
@@ -310,7 +322,7 @@ bool PaceSearch::SlowedIn(const Contour& contour) const {
 }
 
 // True if some contour became faster and still holds.
-bool PaceSearch::RaiseOnce(double step) {
+bool PaceSearch::RaiseOnce(double step, double left) {
   Pace pace = best_pace_;
   for (Contour& contour : contours_) {
     contour.raising = contour.raising && SlowedIn(contour);
@@ -318,7 +330,7 @@ bool PaceSearch::RaiseOnce(double step) {
       Scale(contour, step, pace);
     }
   }
-  if ((pace.cells == best_pace_.cells && pace.idle == best_pace_.idle) || !Try(pace)) {
+  if ((pace.cells == best_pace_.cells && pace.idle == best_pace_.idle) || !Try(pace, left)) {
     return false;
   }
   const std::vector<Outcome> outcomes = OutcomesNow();
@@ -334,20 +346,22 @@ bool PaceSearch::RaiseOnce(double step) {
 }
 
 bool PaceSearch::RaiseWholeContours() {
+  double sizes_left = kRises.size();
   for (const double step : kRises) {
     for (Contour& contour : contours_) {
       contour.raising = true;
     }
-    for (int i = 0; i < kMostRises && RaiseOnce(step); ++i) {
+    const double later = --sizes_left * kRaisesTaken / kRises.size() + kDownTaken + after_;
+    for (int i = 0; i < kMostRises && RaiseOnce(step, Left(kRaisesTaken / kRises.size() - i) + later); ++i) {
     }
   }
-  return !cancelled_ && SlowWholeContours();
+  return !cancelled_ && SlowWholeContours(after_);
 }
 
 // Plans at the best pace so far, judged by the new widening.
-bool PaceSearch::Begin(const Widening& widening) {
+bool PaceSearch::Begin(const Widening& widening, double left) {
   widening_ = widening;
-  if (!Try(best_pace_)) {
+  if (!Try(best_pace_, left)) {
     return false;
   }
   FindContours();
@@ -362,7 +376,10 @@ bool PaceSearch::NoFeedWouldDo() const {
 }
 
 PacedPlan PaceSearch::Explore(const Widening& widening) {
-  if (!Begin(widening)) {
+  const bool again = !widening.empty();
+  const int rounds = again ? kRoundsAgain : kRoundsBothWays;
+  after_ = kDrawing + kExploredAgain + kFinishTaken;
+  if (!Begin(widening, 1.0 + rounds + kBestOnceMore + after_)) {
     return End(Broken());
   }
   if (now_.judged.reason != accuracy::PredictionReason::kPredicted) {
@@ -372,22 +389,22 @@ PacedPlan PaceSearch::Explore(const Widening& widening) {
   if (NoFeedWouldDo()) {
     return End(PaceVerdict::kNotReached);
   }
-  const bool again = !widening.empty();
-  if (!BothWays(again ? kRiseAgain : kFirstRise, again ? kRoundsAgain : kRoundsBothWays) ||
-      !Try(best_pace_)) {
+  if (!BothWays(again ? kRiseAgain : kFirstRise, rounds) || !Try(best_pace_, kBestOnceMore + after_)) {
     return End(Broken());
   }
   return End(PaceVerdict::kHolds);
 }
 
 PacedPlan PaceSearch::Finish(const Widening& widening) {
-  if (!Begin(widening)) {
+  after_ = kDrawing;
+  if (!Begin(widening, kFinishTaken)) {
     return End(Broken());
   }
   if (NoFeedWouldDo()) {
     return End(PaceVerdict::kNotReached);
   }
-  if (!SlowPlaces() || !SlowWholeContours() || (now_.judged.holds && !RaiseWholeContours())) {
+  if (!SlowPlaces() || !SlowWholeContours(kRaisesTaken + after_) ||
+      (now_.judged.holds && !RaiseWholeContours())) {
     return End(Broken());
   }
   return End(now_.judged.holds ? PaceVerdict::kHolds : PaceVerdict::kNotReached);

@@ -16,6 +16,7 @@
 #include <utility>
 
 #include "trajectory/core/tolerance/judged_contour.hpp"
+#include "trajectory/core/tolerance/pass_progress.hpp"
 
 namespace lambdajet::trajectory {
 
@@ -36,7 +37,7 @@ class PaceSearch {
  public:
   // What is named outlives the search. `options` without resume.
   PaceSearch(const ProgramPath& path, const MachineDescription& machine, const PlanOptions& options,
-             const PlanProgress& progress);
+             PassProgress& progress);
 
   // Both ways, from the best pace so far. Refuses at once where no feed would do.
   PacedPlan Explore(const Widening& widening);
@@ -60,7 +61,8 @@ class PaceSearch {
     bool raising = true;
   };
 
-  bool Try(const Pace& pace);  // false: cancelled or refused
+  // `left`: plans expected from here on, this one among them. False: cancelled or refused.
+  bool Try(const Pace& pace, double left);
   void FindContours();
   std::vector<Outcome> OutcomesNow() const;
   void KeepBest();
@@ -71,13 +73,13 @@ class PaceSearch {
   void AskAround(const JudgedPlace& place, Pace& factor) const;
   void AskPast(const JudgedPlace& place, Pace& factor) const;
   void AskSample(std::size_t sample, double room_ratio, Pace& factor) const;
-  bool Begin(const Widening& widening);
+  bool Begin(const Widening& widening, double left);
   bool NoFeedWouldDo() const;
   bool BothWays(double rise, int rounds);
   bool SlowPlaces();
-  bool SlowWholeContours();
+  bool SlowWholeContours(double after);  // `after`: plans expected when it is done
   bool RaiseWholeContours();
-  bool RaiseOnce(double step);
+  bool RaiseOnce(double step, double left);
   void Scale(const Contour& contour, double factor, Pace& pace) const;
   PacedPlan End(PaceVerdict verdict);
   PaceVerdict Broken() const { return cancelled_ ? PaceVerdict::kCancelled : PaceVerdict::kRefused; }
@@ -85,11 +87,12 @@ class PaceSearch {
   const ProgramPath& path_;
   const MachineDescription& machine_;
   PlanOptions options_;
-  const PlanProgress& progress_;
+  PassProgress& progress_;
   Widening widening_;
   PacedPlan now_;
   Pace best_pace_;  // put together of each contour's best
   std::vector<Contour> contours_;
+  double after_ = 0.0;  // passes expected after this search
   int plans_ = 0;
   double fastest_s_ = 0.0;
   bool cancelled_ = false;

@@ -11,6 +11,8 @@ namespace {
 
 constexpr int kExplorations = 3;
 constexpr int kFinishes = 6;
+constexpr double kPassesAfterExploring = 14.0;  // mostly, with the drawing
+constexpr double kPassesAfterFinishing = 2.0;   // so that there is room for a resume, or for another round
 constexpr double kWidenMore = 1.02;
 constexpr double kWidest = 3.0;
 constexpr double kUnlimited_mm =
@@ -84,12 +86,12 @@ const JudgedPlace& BlamedPlace(const JudgedContour& judged, bool& still) {
 class Tolerances {
  public:
   Tolerances(const ProgramPath& path, const MachineDescription& machine, const PlanOptions& options,
-             const PlanProgress& progress)
+             PassProgress& progress)
       : machine_(machine),
         options_(options),
         progress_(progress),
         inner_(InnerOptions(options)),
-        search_(path, machine, inner_, progress) {
+        search_(path, machine, inner_, progress_) {
     answer_.report.asked = true;
   }
 
@@ -98,7 +100,7 @@ class Tolerances {
     PacedPlan found;
     for (int round = 0; round < kExplorations; ++round) {
       found = search_.Explore(widening);
-      if (!Drawn(found)) {
+      if (!Drawn(found, kPassesAfterExploring)) {
         return Refused(std::move(found));
       }
       if (!Widen(found.judged, widening)) {
@@ -107,7 +109,7 @@ class Tolerances {
     }
     for (int round = 0; round < kFinishes; ++round) {
       found = search_.Finish(widening);
-      if (!Drawn(found)) {
+      if (!Drawn(found, kPassesAfterFinishing)) {
         return Refused(std::move(found));
       }
       if (!Widen(found.judged, widening)) {
@@ -125,14 +127,14 @@ class Tolerances {
   }
 
   // True if there is a plan to go on with, its groups' percentiles filled in.
-  bool Drawn(PacedPlan& found) {
+  bool Drawn(PacedPlan& found, double left) {
     answer_.report.plans = found.plans;
     answer_.report.fastest_s = found.fastest_s;
     if (found.verdict != PaceVerdict::kHolds || found.judged.places.empty()) {
       return false;
     }
-    const auto cancelled = [this] { return progress_ && !progress_(0.96); };
-    if (!PredictGroups(machine_, found.planned, found.judged, cancelled)) {
+    if (!progress_.Begin(left) || !PredictGroups(machine_, found.planned, found.judged,
+                                                 [this](double share) { return !progress_.Within(share); })) {
       found.verdict = PaceVerdict::kCancelled;
       return false;
     }
@@ -204,7 +206,7 @@ class Tolerances {
 
   const MachineDescription& machine_;
   const PlanOptions& options_;
-  const PlanProgress& progress_;
+  PassProgress& progress_;
   PlanOptions inner_;
   PaceSearch search_;
   TolerancePlan answer_;
@@ -225,6 +227,12 @@ std::vector<ProgramFault> WishFaults(const std::vector<ToleranceWish>& wishes) {
   return faults;
 }
 
+void End(const PlanProgress& progress, const PlannedProgram& planned) {
+  if (progress && planned.faults.empty()) {
+    (void)progress(1.0);
+  }
+}
+
 }  // namespace
 
 TolerancePlan PlanToTolerance(std::string_view program, const MachineDescription& machine,
@@ -232,6 +240,7 @@ TolerancePlan PlanToTolerance(std::string_view program, const MachineDescription
   TolerancePlan answer;
   if (options.hold.empty()) {
     answer.planned = PlanPartProgram(program, machine, options, progress);
+    End(progress, answer.planned);
     return answer;
   }
   answer.planned.faults = WishFaults(options.hold);
@@ -244,11 +253,15 @@ TolerancePlan PlanToTolerance(std::string_view program, const MachineDescription
   if (!answer.planned.faults.empty()) {
     return answer;
   }
-  answer = Tolerances(path, machine, options, progress).Solve();
+  PassProgress passes(progress);
+  answer = Tolerances(path, machine, options, passes).Solve();
   if (answer.planned.faults.empty() && options.start_from_s_mm) {
     fast.pace = std::make_shared<const Pace>(answer.report.pace);
-    answer.planned = PlanLaidOutProgram(path, machine, fast, progress);
+    passes.Begin(1.0);
+    answer.planned =
+        PlanLaidOutProgram(path, machine, fast, [&passes](double share) { return passes.Within(share); });
   }
+  End(progress, answer.planned);
   answer.planned.plan.id = PlanIdOf(program, options, machine);
   return answer;
 }

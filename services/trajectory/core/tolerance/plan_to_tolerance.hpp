@@ -6,6 +6,7 @@
 // Refused with TOLERANCE_NOT_REACHED where what the feed cannot change is too much already, or no pace was found: with line,
 // place, excess, the source to blame and what would help.
 // With a resume, the pace is found for the whole program and the rest planned with it.
+// Progress never falls, moves with every plan that is tried (pass_progress.hpp), and is 1 when there is a plan.
 // Frames: W. Units: mm, s. Threads: pure; same inputs, same plan. Cost: some 20 to 60 plans. Errors: faults, no plan then.
 #pragma once
 
