@@ -1,7 +1,9 @@
 #include <gtest/gtest.h>
+#include <sqlite3.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <filesystem>
 #include <thread>
 
 #include "foundation/contract/trouble.hpp"
@@ -53,6 +55,22 @@ TEST_F(Store, GivesBackWhatWasPutIn) {
                           })
                   .ok());
   EXPECT_EQ(seen, (std::vector<std::string>{"job-1", "job-2"}));
+}
+
+// As a journal grows from shift to shift: by a little in every transaction, read back now and then.
+TEST_F(Store, HoldsNoMoreInMemoryHoweverLongTheFileGrows) {
+  auto database = Open();
+  const std::string note(64 << 10, 'n');
+  std::int64_t early = 0;
+  for (int i = 0; i < 64; ++i) {
+    ASSERT_TRUE(
+        database->Run("INSERT INTO job VALUES (?, ?, ?)", {"job-" + std::to_string(i), i, SqlBlob{note}})
+            .ok());
+    EXPECT_EQ(Count(*database), i + 1);
+    early = i == 3 ? sqlite3_memory_used() : early;
+  }
+  EXPECT_GT(std::filesystem::file_size(path_) + std::filesystem::file_size(path_ + "-wal"), 4u << 20);
+  EXPECT_LE(sqlite3_memory_used(), early + (Database::kCacheKib << 10)) << "from " << early << " bytes";
 }
 
 TEST_F(Store, RollsBackAWorkThatFails) {

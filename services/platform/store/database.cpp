@@ -102,7 +102,10 @@ class Database::Inside {
     }
     sqlite3_extended_result_codes(connection, 1);
     sqlite3_busy_timeout(connection, kBusyMs);
-    return Script("PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL; PRAGMA foreign_keys = ON;");
+    return Script(
+        "PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL; PRAGMA foreign_keys = ON; PRAGMA cache_size = "
+        "-" +
+        std::to_string(kCacheKib) + ";");
   }
 
   // Several statements in one text, without values.

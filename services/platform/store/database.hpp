@@ -4,7 +4,8 @@
 // texts; the file's user_version says how many have been applied, and Open() applies the rest, each in a transaction. A
 // file from a newer program is refused. Statements are prepared once and kept.
 // Threads: any; a call, or a whole Transact(), has the connection to itself.
-// Cost: one fsync a transaction that writes.
+// Cost: one fsync a transaction that writes; pages of the file are held in memory up to Database::kCacheKib and a transaction's
+// own, however long the file grows.
 // Errors: RESOURCE_EXHAUSTED DISK_FULL, UNAVAILABLE DATABASE_BUSY (another process held it for 5 s), DATA_LOSS
 // DATABASE_DAMAGED, ALREADY_EXISTS CONSTRAINT (a unique key is there already), PERMISSION_DENIED NOT_PERMITTED,
 // FAILED_PRECONDITION DATABASE_TOO_NEW, INTERNAL DATABASE_TROUBLE.
@@ -64,6 +65,8 @@ class Row {
 
 class Database {
  public:
+  static constexpr int kCacheKib = 256;
+
   static absl::StatusOr<std::unique_ptr<Database>> Open(const std::string& path,
                                                         const std::vector<std::string>& migrations);
   ~Database();
