@@ -4,25 +4,21 @@ The stubs are generated at build time into build/<preset>/python; point LAMBDAJE
 default layout. One Cell object holds one channel for each process.
 
     cell = Cell()                      # processes on this host, default ports
-    job = cell.jobs.SubmitJob(...)
+    try:
+        job = cell.jobs.SubmitJob(...)
+    except grpc.RpcError as error:
+        print(trouble_of(error))       # reason, value, what would be right; see lambdajet_trouble.py
 """
 
-import os
-import pathlib
-import sys
-
 import grpc
+import lambdajet_stubs  # noqa: F401  # before the stubs
 
-_SOURCE = pathlib.Path(__file__).resolve().parents[2]
-_STUBS = pathlib.Path(os.environ.get("LAMBDAJET_PYTHON_STUBS", _SOURCE / "build" / "release" / "python"))
-if str(_STUBS) not in sys.path:
-    sys.path.insert(0, str(_STUBS))
-
-from lambdajet.accuracy.v1 import accuracy_pb2, accuracy_pb2_grpc  # noqa: E402
-from lambdajet.calibration.v1 import calibration_pb2, calibration_pb2_grpc  # noqa: E402
-from lambdajet.cell.v1 import cell_pb2, cell_pb2_grpc  # noqa: E402
-from lambdajet.inspection.v1 import inspection_pb2, inspection_pb2_grpc  # noqa: E402
-from lambdajet.trajectory.v1 import trajectory_pb2, trajectory_pb2_grpc  # noqa: E402
+from lambdajet.accuracy.v1 import accuracy_pb2, accuracy_pb2_grpc
+from lambdajet.calibration.v1 import calibration_pb2, calibration_pb2_grpc
+from lambdajet.cell.v1 import cell_pb2, cell_pb2_grpc
+from lambdajet.inspection.v1 import inspection_pb2, inspection_pb2_grpc
+from lambdajet.trajectory.v1 import trajectory_pb2, trajectory_pb2_grpc
+from lambdajet_trouble import Trouble, trouble_of  # noqa: F401  # for who imports this
 
 # name: default gRPC port on this host
 PORTS = {
@@ -40,13 +36,18 @@ _SERVING = b"\x08\x01"  # grpc.health.v1.HealthCheckResponse{status: SERVING}
 
 
 class Cell:
-    """Channels and stubs of one cell. addresses: process name -> host:port, for those not on their default port."""
+    """Channels and stubs of one cell. addresses: process name -> host:port, for those not on their default port.
+    credentials: grpc.ssl_channel_credentials(ca, key, certificate) where the cell speaks TLS; which calls the certificate allows
+    is the services' rpc.roles."""
 
-    def __init__(self, addresses=None):
+    def __init__(self, addresses=None, credentials=None):
         self.addresses = {name: f"127.0.0.1:{port}" for name, port in PORTS.items()}
         self.addresses.update(addresses or {})
         options = [("grpc.max_receive_message_length", 64 << 20), ("grpc.max_send_message_length", 64 << 20)]
-        self.channels = {name: grpc.insecure_channel(at, options) for name, at in self.addresses.items()}
+        self.channels = {
+            name: grpc.secure_channel(at, credentials, options) if credentials else grpc.insecure_channel(at, options)
+            for name, at in self.addresses.items()
+        }
         self.jobs = cell_pb2_grpc.CellServiceStub(self.channels["cell"])
         self.trajectory = trajectory_pb2_grpc.TrajectoryServiceStub(self.channels["trajectory"])
         self.calibration = calibration_pb2_grpc.CalibrationServiceStub(self.channels["calibration"])

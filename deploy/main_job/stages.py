@@ -3,7 +3,7 @@
 import time
 
 import grpc
-from lambdajet_client import accuracy_pb2, calibration_pb2, cell_pb2, inspection_pb2, trajectory_pb2
+from lambdajet_client import accuracy_pb2, calibration_pb2, cell_pb2, inspection_pb2, trajectory_pb2, trouble_of
 from lambdajet.type.v1 import operation_pb2
 
 RPC_TIMEOUT_S = 20.0
@@ -187,5 +187,5 @@ def wait_for_version(cell, version):
 def explain(error):
     """A gRPC error in one line, with its reason."""
     if isinstance(error, grpc.RpcError):
-        return f"{error.code().name}: {error.details()}"
+        return f"{error.code().name}: {trouble_of(error)}"
     return str(error)

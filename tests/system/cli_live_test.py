@@ -138,6 +138,10 @@ class EveryVerb(unittest.TestCase):
         people, checked = ask("trajectory", "ask-check", part)
         self.assertIn("admitted", people)
         self.assertTrue(checked["admitted"])
+        told = "where the programmed feed is not held"
+        asked = run("trajectory", "ask-plan", part)
+        here = run("trajectory", "plan", part, "--machine", under_test.SOURCE / "deploy" / "config" / "machine.yaml")
+        self.assertEqual(asked[asked.index(told):].strip(), here[here.index(told):].strip(), "the same table here and there")
         people, planned = ask("trajectory", "ask-plan", part, "--compensate")
         plan = planned["summary"]["plan_id"]
         self.assertIn("contour tolerance used", people)

@@ -11,11 +11,14 @@ import types
 import unittest
 
 import cell_under_test as under_test
+import grpc
 from eventually import eventually
+from lambdajet_client import cell_pb2, trajectory_pb2, trouble_of
 
 BUILD = pathlib.Path(sys.argv.pop(1))
 UNREACHABLE, REFUSED, DONE = 3, 4, 0
 PATIENCE_S = 20
+PROGRAM = b"G21 G90\nG0 X300 Y300\nM3 P0.3\nG1 X320 F3600\nM5\nM2\n"
 
 
 class Authority:
@@ -115,6 +118,50 @@ class Tls(unittest.TestCase):
         while "trajectory   SERVING" not in said:
             self.assertLess(time.monotonic(), deadline, said)
             _, said = self.ask("machine", "state", ca=self.authority.ca, own=self.client)
+
+    def python_client(self, own):
+        """The Python client with a certificate of its own."""
+        credentials = grpc.ssl_channel_credentials(*(path.read_bytes() for path in (self.authority.ca, own[1], own[0])))
+        cell = under_test.lambdajet_client.Cell(self.processes.addresses(), credentials)
+        self.addCleanup(cell.close)
+        return cell
+
+    def submitted_with_roles(self, certificate):
+        """What becomes of a job where trajectory knows roles and the cell shows this certificate."""
+        shipped = (under_test.SOURCE / "deploy" / "config" / "trajectory.yaml").read_text()
+        roles = [line.split('"')[1] for line in shipped.splitlines() if line.startswith("  #   - ")]
+        self.assertEqual([role.split(":")[0] for role in roles], ["cell", "cam"])
+        self.processes.flags.append(f"--rpc.roles={','.join(roles)},mes: CN=client -> CellService/*")
+        self.start("calibration", "trajectory", "cell", mutual=True,
+                   further=[f"--trajectory.ca_file={self.authority.ca}", f"--trajectory.certificate_file={certificate[0]}",
+                            f"--trajectory.key_file={certificate[1]}"])
+        cell = self.python_client(self.client)
+        job = cell.jobs.SubmitJob(cell_pb2.SubmitJobRequest(request_id="one", name="a plate", program=PROGRAM), timeout=10).job
+        deadline = time.monotonic() + PATIENCE_S
+        while job.state == cell_pb2.JOB_STATE_ADMITTING and time.monotonic() < deadline:
+            time.sleep(0.05)
+            job = cell.jobs.GetJob(cell_pb2.GetJobRequest(job_id=job.job_id), timeout=10).job
+        return cell, job
+
+    def test_the_cell_plans_with_the_role_that_the_shipped_file_shows(self):
+        cell, job = self.submitted_with_roles(self.authority.issue("cell"))
+        self.assertEqual(cell_pb2.JobState.Name(job.state), "JOB_STATE_READY", job)
+        with self.assertRaises(grpc.RpcError) as refused:
+            cell.trajectory.PlanProgram(trajectory_pb2.PlanProgramRequest(program=PROGRAM), timeout=5)
+        trouble = trouble_of(refused.exception)
+        self.assertEqual((trouble.code, trouble.reason), (grpc.StatusCode.PERMISSION_DENIED, "ROLE_NOT_ALLOWED"))
+        self.assertIn("role mes (CN=client", trouble.message)
+        self.assertIn("a certificate of role cell, cam is right", trouble.message)
+        planner = self.python_client(self.authority.issue("planner", "cam"))
+        self.assertTrue(planner.trajectory.PlanProgram(trajectory_pb2.PlanProgramRequest(program=PROGRAM), timeout=5).plan_id)
+        with self.assertRaises(grpc.RpcError) as refused:
+            planner.trajectory.StartStreaming(trajectory_pb2.StartStreamingRequest(plan_id=1), timeout=5)
+        self.assertEqual(trouble_of(refused.exception).reason, "ROLE_NOT_ALLOWED")
+
+    def test_a_cell_without_a_role_at_trajectory_fails_its_jobs_and_says_why(self):
+        _, job = self.submitted_with_roles(self.authority.issue("some-cell"))
+        self.assertEqual((cell_pb2.JobState.Name(job.state), job.reason), ("JOB_STATE_FAILED", "ROLE_NOT_ALLOWED"), job)
+        self.assertIn("a certificate of role cell, cam is right", job.message)
 
     def test_a_client_may_call_what_its_role_allows(self):
         roles = ("--rpc.roles=viewer: CN=client -> CalibrationService/Get* CalibrationService/List*,"

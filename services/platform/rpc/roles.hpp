@@ -2,8 +2,8 @@
 //
 // Model: each line of `rpc.roles` is "ROLE: WHO… -> RPC…". WHO is CN=name or OU=name of the certificate's subject; RPC is
 // Service/Method without its package, and may end in *. A client has every role that names it, and may call what any of
-// them allows; health and reflection are everybody's. A house that asks another (the
-// cell asks trajectory) is a client like any other. Refused calls never reach a handler: PERMISSION_DENIED
+// them allows; health and reflection are everybody's. A house that asks another (the cell asks trajectory) is a client like any
+// other and needs a role there; deploy/config/trajectory.yaml shows the cell's. Refused calls never reach a handler: PERMISSION_DENIED
 // ROLE_NOT_ALLOWED, with the roles and what would be right. The guard writes one audit line for each refused call, and for
 // each allowed one that does more than read.
 // Threads: the table is immutable; the guard is asked from gRPC's threads. Cost: some comparisons of short texts a call.
