@@ -363,6 +363,23 @@ TEST_F(TrajectoryServiceTest, APlanOfALargeProgramIsWrittenOutInPieces) {
   }
 }
 
+TEST_F(TrajectoryServiceTest, ABurstOfPlansDoesNotPushOutOneThatIsDone) {
+  const std::uint64_t done = PlanAndWait(kPlate).summary().plan_id();
+  v1::PlanProgramRequest request;
+  request.set_program(kPlate);
+  for (std::size_t i = 0; i < PlanDesk::kMostPlans; ++i) {  // each takes some twenty plans
+    request.mutable_options()->set_tolerance_mm(0.1 + 1e-4 * static_cast<double>(i));
+    v1::PlanProgramResponse asked;
+    ASSERT_TRUE(Call(&Stub::PlanProgram, *stub_, request, asked).ok());
+  }
+  v1::GetPlanRequest get;
+  get.set_plan_id(done);
+  v1::GetPlanResponse plan;
+  const absl::Status status = Call(&Stub::GetPlan, *stub_, get, plan);
+  EXPECT_TRUE(status.ok()) << status;
+  EXPECT_EQ(plan.summary().plan_id(), done);
+}
+
 TEST_F(TrajectoryServiceTest, ADrawingThatCannotBeCutIsRefusedWithItsLines) {
   Written open{Shipped("cover/cover.dxf"),
                type::v1::PROGRAM_FORMAT_DXF};  // its centre lines are open contours

@@ -125,22 +125,19 @@ void PlanDesk::Settle(const std::shared_ptr<PlanRecord>& record,
   {
     const std::lock_guard lock(mutex_);
     record->state = record->cancel ? PlanState::kCancelled : done ? PlanState::kDone : PlanState::kFailed;
+    GiveUpOldest();
   }
   ended_.notify_all();
   (done ? plans_done_ : plans_failed_).Increment();
   planning_time_.Observe(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
 }
 
-// Called with the mutex held.
+// Called with the mutex held. Those that wait or are planned do not count: a burst of them must not push out what is done.
 void PlanDesk::GiveUpOldest() {
-  while (records_.size() > kMostPlans) {
-    const auto oldest = std::find_if(records_.begin(), records_.end(), [this](const auto& r) {
-      return r->state != PlanState::kRunning && r->id != kept_;
-    });
-    if (oldest == records_.end()) {
-      return;
-    }
-    records_.erase(oldest);
+  const auto ended = [this](const auto& r) { return r->state != PlanState::kRunning && r->id != kept_; };
+  for (auto count = std::count_if(records_.begin(), records_.end(), ended);
+       count > static_cast<std::ptrdiff_t>(kMostPlans); --count) {
+    records_.erase(std::find_if(records_.begin(), records_.end(), ended));
   }
 }
 

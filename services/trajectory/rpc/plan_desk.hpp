@@ -51,7 +51,7 @@ struct PlanRecord {
 
 class PlanDesk {
  public:
-  static constexpr std::size_t kMostPlans = 12;
+  static constexpr std::size_t kMostPlans = 12;  // that have ended
   static constexpr std::size_t kMostKeptBytes =
       2u << 20;  // of a program in memory; longer ones are kept in a file
 
