@@ -10,8 +10,8 @@
 #include "tests/laws/trajectory_spatial_cases.hpp"
 #include "tests/laws/trajectory_spatial_reference.hpp"
 #include "trajectory/core/part_program/cldata_writer.hpp"
+#include "trajectory/core/part_program/gcode_writer.hpp"
 #include "trajectory/core/spatial_feed/play_spatial_plan.hpp"
-#include "trajectory/core/toolpath/program_text.hpp"
 
 namespace lambdajet::trajectory {
 namespace {
@@ -498,10 +498,9 @@ TEST(SpatialSpindle, IsWaitedForWhereItsSpeedChanges) {
               testing::Pointwise(testing::DoubleNear(1e-12), {6000.0, 1.0, 12000.0, -3000.0, -1.0, 0.0}));
   EXPECT_NEAR(planned.gate_time_s, 3.375, 1e-12);
   // Written out in both notations it is the same program.
-  const std::optional<std::string> gcode = OperationsText(program.operations, "spindle");
-  ASSERT_TRUE(gcode.has_value());
+  const std::string gcode = WriteGcode(program.operations, "spindle");
   const CldataText cldata = WriteCldata(program.operations, "spindle", {}, ToolAngles::kRollPitch);
-  for (const std::string& written : {*gcode, cldata.text}) {
+  for (const std::string& written : {gcode, cldata.text}) {
     const PartProgram again = ReadSpatialProgram(written, WorkedMotion());
     ASSERT_TRUE(again.faults.empty()) << written << again.faults[0].message;
     const PlannedSpatialProgram same = PlanOf(again.operations);
