@@ -255,8 +255,8 @@ TEST_F(SpatialServiceTest, RefusesWithStepReasonValueAndLine) {
         Wrong{"G0 Z20\nG1 A45 F600\nM2\n", "PLACE", "JOINT_LIMIT", 2, "PLATFORM_JOINT_CONE"},
         Wrong{"G0 Z20\nG1 Z-400 F600\nM2\n", "PLACE", "ACTUATOR_LIMIT", 2, "mm; move the part"},
         Wrong{"G0 X-60 Z20\nG3 X60 I60 J-200 F600\nM2\n", "REACH", "ACTUATOR_LIMIT", 2, "STRUT_MAX"},
-        Wrong{"PARTNO A\nFROM/0,0,20\nCYCLE/DRILL,9,60,MMPM,2\nFINI\n", "PARSE", "UNKNOWN_WORD", 3,
-              "GOTO"}}) {
+        Wrong{"PARTNO A\nFROM/0,0,20\nCYCLE/DRILL,9,60,MMPM,2\nFINI\n", "PARSE", "CYCLE_NUMBER_WITHOUT_WORD",
+              3, "a word must say what this number means"}}) {
     SCOPED_TRACE(w.program);
     absl::Status status;
     const auto steps = Steps(w.program, status);
