@@ -26,10 +26,11 @@ std::string StateName(cell_v1::JobState state) {
 }
 
 std::string FormatWords(type::v1::ProgramFormat format) {
-  return format == type::v1::PROGRAM_FORMAT_GCODE    ? "  from G-code"
-         : format == type::v1::PROGRAM_FORMAT_CLDATA ? "  from CLDATA"
-         : format == type::v1::PROGRAM_FORMAT_DXF    ? "  from DXF"
-                                                     : "";
+  return format == type::v1::PROGRAM_FORMAT_GCODE        ? "  from G-code"
+         : format == type::v1::PROGRAM_FORMAT_CLDATA     ? "  from CLDATA"
+         : format == type::v1::PROGRAM_FORMAT_DXF        ? "  from DXF"
+         : format == type::v1::PROGRAM_FORMAT_FLAT_GCODE ? "  from flat G-code"
+                                                         : "";
 }
 
 Tone ToneOf(cell_v1::JobState state) {

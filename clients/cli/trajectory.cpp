@@ -292,6 +292,10 @@ CLI::App* AddProgramVerb(CLI::App& noun, Output& output, const char* name, const
 }
 
 void AddMachineOptions(CLI::App& app, const std::shared_ptr<ProgramVerb>& verb) {
+  app.add_flag_function(
+      "--leave-out-z",
+      [verb](std::int64_t) { verb->options.notation = trajectory::ProgramNotation::kFlatGcode; },
+      "flat G-code of a post with Z: Z words and tool lengths are read over");
   app.add_option("--machine", verb->machine, "YAML file of the machine")->capture_default_str();
   app.add_option("--hexapod", verb->hexapod, "YAML file of a hexapod, for programs in X Y Z A B C")
       ->excludes("--machine");

@@ -511,7 +511,7 @@ void AddFormatOptions(CLI::App& verb, FormatOptions& options) {
   using Settings = type::v1::ToolpathSettings;
   constexpr double kDegree_rad = std::numbers::pi / 180.0;
   verb.add_option("--format", options.format, "file: as the name of the file ends, or as it begins")
-      ->check(CLI::IsMember({"file", "gcode", "cldata", "dxf"}))
+      ->check(CLI::IsMember({"file", "gcode", "flat-gcode", "cldata", "dxf"}))
       ->capture_default_str();
   const auto number = [&](const char* name, const char* what, auto set) {
     AddSetting<double>(verb, options, name, what, set);
@@ -565,9 +565,13 @@ void AddFormatOptions(CLI::App& verb, FormatOptions& options) {
 
 type::v1::ProgramFormat FormatOf(const FormatOptions& options, const std::string& file) {
   static const std::map<std::string_view, type::v1::ProgramFormat> kFormats = {
-      {"gcode", type::v1::PROGRAM_FORMAT_GCODE}, {"cldata", type::v1::PROGRAM_FORMAT_CLDATA},
-      {"dxf", type::v1::PROGRAM_FORMAT_DXF},     {"ngc", type::v1::PROGRAM_FORMAT_GCODE},
-      {"nc", type::v1::PROGRAM_FORMAT_GCODE},    {"apt", type::v1::PROGRAM_FORMAT_CLDATA},
+      {"flat-gcode", type::v1::PROGRAM_FORMAT_FLAT_GCODE},
+      {"gcode", type::v1::PROGRAM_FORMAT_GCODE},
+      {"cldata", type::v1::PROGRAM_FORMAT_CLDATA},
+      {"dxf", type::v1::PROGRAM_FORMAT_DXF},
+      {"ngc", type::v1::PROGRAM_FORMAT_GCODE},
+      {"nc", type::v1::PROGRAM_FORMAT_GCODE},
+      {"apt", type::v1::PROGRAM_FORMAT_CLDATA},
       {"cls", type::v1::PROGRAM_FORMAT_CLDATA}};
   std::string word = options.format;
   if (word == "file") {

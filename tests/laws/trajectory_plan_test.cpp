@@ -379,6 +379,30 @@ TEST_P(PlanLaws, HoldOnShippedPrograms) {
 
 INSTANTIATE_TEST_SUITE_P(Elastic, PlanLaws, testing::Values(false, true));
 
+// A post for machines with Z lifts the tool; read as flat G-code its plan is that of the program without those words.
+TEST(PlanLaws, FlatGcodeIsPlannedWithoutItsZ) {
+  const MachineDescription m = DemoLikeMachine();
+  const std::string lifted =
+      "G21 G90 G43 H1\nG0 Z5\nG0 X100 Y100 Z5\nM3 P0.5\nG1 Z-3 F3000\nG1 X180 Z-3\nG2 X200 Y120 I0 "
+      "J20\nM5\nG0 Z25\nM2\n";
+  const std::string flat =
+      "G21 G90\n\nG0 X100 Y100\nM3 P0.5\nG1 F3000\nG1 X180\nG2 X200 Y120 I0 J20\nM5\n\nM2\n";
+  PlanOptions options;
+  const PlannedProgram refused = PlanPartProgram(lifted, m, options);
+  ASSERT_FALSE(refused.faults.empty());
+  EXPECT_EQ(refused.faults[0].reason, "AXIS_NOT_DRIVEN");
+  const PlannedProgram wanted = PlanPartProgram(flat, m, options);
+  options.notation = ProgramNotation::kFlatGcode;
+  const PlannedProgram planned = PlanPartProgram(lifted, m, options);
+  ASSERT_TRUE(planned.faults.empty()) << planned.faults[0].reason << " " << planned.faults[0].message;
+  ASSERT_TRUE(wanted.faults.empty());
+  ASSERT_EQ(planned.plan.segments.size(), wanted.plan.segments.size());
+  for (std::size_t i = 0; i < planned.plan.segments.size(); ++i) {
+    ASSERT_EQ(planned.plan.segments[i].q_mm[0].c, wanted.plan.segments[i].q_mm[0].c);
+    ASSERT_EQ(planned.plan.segments[i].q_mm[1].c, wanted.plan.segments[i].q_mm[1].c);
+  }
+}
+
 // The idle move after the cut comes nearer to the last corner than the cut itself at first does. That it passes there is neither
 // a corner that is held nor one that slowing the idle move would mend.
 TEST(PlanLaws, AnIdleMoveThatComesByACornerIsNoCut) {

@@ -276,6 +276,9 @@ const std::vector<Written>& ProgramsInAllFormats() {
       {Shipped("cover/cover.cldata"), type::v1::PROGRAM_FORMAT_CLDATA},
       {Shipped("cover/cover.dxf"), type::v1::PROGRAM_FORMAT_DXF},
       {Shipped("bracket.ngc"), type::v1::PROGRAM_FORMAT_GCODE},
+      {"G21 G90 G43 H1\nG0 X100 Y100 Z5\nM3 P0.5\nG1 Z-3 F3000\nG1 X180 Z-3\nG2 X200 Y120 I0 J20\nM5\nG0 "
+       "Z25\nM2\n",
+       type::v1::PROGRAM_FORMAT_FLAT_GCODE},
       {"G20 G90 G64 P0.001\nG0 X8 Y8\nM3\nG93 G1 X9 F40\nG2 X10 Y8 I0.5 J0 F30\nG94 G1 X10.5 "
        "F100\nG61\nM5\nG4 "
        "P0.2\nG0 X12\nM62 P0\nG91 G1 X1\nM63 P0\nM100 P2\nM2\n"}};

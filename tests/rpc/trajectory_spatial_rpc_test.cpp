@@ -303,6 +303,8 @@ TEST_F(SpatialServiceTest, RefusesRequestsThatCannotBeMeant) {
         "NOT_FOR_HEXAPOD");
   wrong([](auto& r) { r.set_format(type::v1::PROGRAM_FORMAT_DXF); }, Code::kInvalidArgument,
         "NOT_FOR_HEXAPOD");
+  wrong([](auto& r) { r.set_format(type::v1::PROGRAM_FORMAT_FLAT_GCODE); }, Code::kInvalidArgument,
+        "NOT_FOR_HEXAPOD");
   wrong([](auto& r) { r.set_program("G1 X1 (\xff\xfe)\nM2\n"); }, Code::kInvalidArgument, "NOT_UTF8");
   wrong([](auto& r) { r.set_program(""); }, Code::kInvalidArgument, "EMPTY");
   v1::ListOperationsRequest list;

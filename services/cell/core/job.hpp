@@ -45,7 +45,7 @@ struct ModelVersion {
 };
 
 // As on the wire: what a program is written in.
-enum class ProgramFormat : std::uint32_t { kByContent = 0, kGcode, kCldata, kDxf };
+enum class ProgramFormat : std::uint32_t { kByContent = 0, kGcode, kCldata, kDxf, kFlatGcode };
 
 // What a client asked.
 struct JobOrder {

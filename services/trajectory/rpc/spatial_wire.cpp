@@ -80,6 +80,8 @@ absl::StatusOr<SpatialOptions> SpatialFromWire(const v1::PlanOptions& wire, Prog
   refuse(wire.has_start_from_s_mm(), "options.start_from_s_mm");
   refuse(wire.has_overlap_mm(), "options.overlap_mm");
   refuse(wire.has_machine_version(), "options.machine_version");
+  checks.Require(notation != ProgramNotation::kFlatGcode, "format", "NOT_FOR_HEXAPOD",
+                 "a hexapod moves Z; flat G-code is for the open-base machine");
   SpatialOptions options;
   options.notation = notation;
   options.feed_scale = wire.has_feed_scale() ? wire.feed_scale() : 1.0;

@@ -205,6 +205,8 @@ absl::StatusOr<SubmittedProgram> FromWire(const std::string& program, ProgramFor
       return settings.status();
     }
     submitted.drawing = std::move(*settings);
+  } else if (format == type::v1::PROGRAM_FORMAT_FLAT_GCODE) {
+    submitted.notation = ProgramNotation::kFlatGcode;
   } else if (format != type::v1::PROGRAM_FORMAT_UNSPECIFIED &&
              LooksLikeCldata(program) != (format == type::v1::PROGRAM_FORMAT_CLDATA)) {
     // Named otherwise than it looks; where both agree the plan is that of a request that names no format.

@@ -169,13 +169,14 @@ bool Sort(Reading& r, Code c, int group, char letter) {
   r.columns[0] = c.column;  // for the faults below; the motion word overwrites it
   if (group == kNoCode) {
     return r.FaultAt(kMotion, letter == 'G' ? "UNKNOWN_G_CODE" : "UNKNOWN_M_CODE",
-                     letter == 'G' ? AdviceOnG(c.tenfold)
-                                   : "not a word of this machine; see the table of supported words");
+                     letter == 'G'     ? AdviceOnG(c.tenfold)
+                     : c.tenfold == 60 ? "this machine has one tool and no changer; delete the word"
+                                       : "not a word of this machine; see the table of supported words");
   }
   const auto g = static_cast<std::size_t>(group);
   if (r.codes[g] != kNoCode) {
     return r.FaultAt(kMotion, "MODAL_GROUP_TWICE",
-                     "two words of one modal group contradict each other in this line");
+                     "two words of one modal group contradict each other in this line; write them in two");
   }
   r.codes[g] = c.tenfold;
   r.columns[g] = c.column;
@@ -663,7 +664,8 @@ bool AxesDriven(Reading& r) {
     }
     return r.FaultAt(letter, "AXIS_NOT_DRIVEN",
                      letter == 'Z'
-                         ? "this machine does not move Z; the reader can be told to leave Z words out"
+                         ? "this machine does not move Z; where Z only lifts a tool, ask for flat G-code "
+                           "(--format flat-gcode, --leave-out-z): its Z words are read over"
                          : "this machine does not move this axis");
   }
   return true;

@@ -8,7 +8,9 @@ namespace lambdajet::trajectory {
 PartProgram ReadPartProgram(std::string_view text, const ReadOptions& options) {
   const bool cldata = options.notation == ProgramNotation::kCldata ||
                       (options.notation == ProgramNotation::kByContent && LooksLikeCldata(text));
-  PartProgram program = cldata ? ReadCldata(text, options.cldata) : ReadGcode(text, options.gcode);
+  GcodeOptions gcode = options.gcode;
+  gcode.leave_out_z = gcode.leave_out_z || options.notation == ProgramNotation::kFlatGcode;
+  PartProgram program = cldata ? ReadCldata(text, options.cldata) : ReadGcode(text, gcode);
   return options.compensate_kerf && program.faults.empty() ? CompensateKerf(std::move(program)) : program;
 }
 

@@ -2,6 +2,7 @@
 //
 // Model: the first statement tells: a word of CLDATA ("PARTNO", "GOTO/…", "$$") or else G-code. Both readers give the same
 // canonical operations, so everything behind them is the same.
+// Flat G-code is written for machines with a Z axis; its Z words and tool lengths are read over (GcodeOptions::leave_out_z).
 // Threads: pure. Errors: the readers' faults, and those of the kerf's compensation.
 #pragma once
 
@@ -12,7 +13,7 @@
 
 namespace lambdajet::trajectory {
 
-enum class ProgramNotation : std::uint8_t { kByContent, kGcode, kCldata };
+enum class ProgramNotation : std::uint8_t { kByContent, kGcode, kCldata, kFlatGcode };
 
 struct ReadOptions {
   ProgramNotation notation = ProgramNotation::kByContent;
