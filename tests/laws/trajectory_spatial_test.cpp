@@ -9,6 +9,7 @@
 
 #include "tests/laws/trajectory_spatial_cases.hpp"
 #include "tests/laws/trajectory_spatial_reference.hpp"
+#include "trajectory/core/feed/binding.hpp"
 #include "trajectory/core/part_program/cldata_writer.hpp"
 #include "trajectory/core/part_program/gcode_writer.hpp"
 #include "trajectory/core/spatial_feed/play_spatial_plan.hpp"
@@ -558,6 +559,75 @@ TEST(SpatialProgram, IsAdmittedOrRefusedAtTheRightCheck) {
           "CYCLE_UNKNOWN", 3);
   refused("PARTNO A\nFROM/0,0,20\nFEDRAT/600,MMPM\nCUTTER/6\nTLCOMP/LEFT\nGOTO/9,0,20\nFINI\n",
           AdmissionCheck::kParse, "COMPENSATION_NOT_SUPPORTED", 6);
+}
+
+// The largest share of a strut's limit that is played within two milliseconds of a path length; negative for other limits.
+double ShareAbout(const SpatialPlan& plan, FeedLimit limit, double s_mm) {
+  const HexapodMotion m = WorkedMotion();
+  double share = -1.0;
+  for (const SpatialSegment& s : plan.segments) {
+    if (s.s_mm.value(s.duration_s) < s_mm - 1e-9 || s.s_mm.value(0.0) > s_mm + 1e-9) {
+      continue;
+    }
+    double from = 0.0;
+    while (from < s.duration_s && s.s_mm.value(from) < s_mm) {
+      from += 1e-4;
+    }
+    for (double t = std::max(0.0, from - 2e-3); t <= std::min(s.duration_s, from + 2e-3); t += 1e-4) {
+      for (std::size_t j = 0; j < kStrutCount; ++j) {
+        const Polynomial& q = s.q_mm[j];
+        if (limit == ActuatorVelocityLimit(j)) {
+          share = std::max(share, std::abs(q.first(t)) / m.strut_velocity_mm_per_s);
+        } else if (limit == ActuatorAccelerationLimit(j)) {
+          share = std::max(share, std::abs(q.second(t)) / m.strut_acceleration_mm_per_s2);
+        } else if (limit == FeedLimit::kActuatorJerk) {
+          share = std::max(share, std::abs(q.third(t)) / m.strut_jerk_mm_per_s3);
+        }
+      }
+    }
+  }
+  return share;
+}
+
+// Where a plan says that a strut's limit slows it, the struts use as much of it there as it says, within 1 %.
+TEST(SpatialBinding, WhatIsNamedIsReachedWhereItIsNamed) {
+  std::size_t stretches = 0, checked = 0;
+  double worst_off = 0.0;
+  std::array<double, kFeedLimitCount> length_mm{};
+  for (std::uint64_t seed = 1; seed <= 12; ++seed) {
+    SCOPED_TRACE(seed);
+    const PlannedSpatialProgram planned = PlanOf(RandomSpatialProgram(seed).Draw(12));
+    ASSERT_TRUE(planned.faults.empty()) << FaultText(planned);
+    double last_mm = 0.0, cut_mm = 0.0;
+    for (const SlowStretch& slow : planned.slow) {
+      ASSERT_GE(slow.from_s_mm, last_mm - 1e-9);
+      ASSERT_GE(slow.at_s_mm, slow.from_s_mm);
+      ASSERT_LE(slow.at_s_mm, slow.to_s_mm);
+      last_mm = slow.to_s_mm;
+      length_mm[static_cast<std::size_t>(slow.limit)] += slow.to_s_mm - slow.from_s_mm;
+      ++stretches;
+      EXPECT_EQ(slow.limit != FeedLimit::kSmoothing, slow.reached_share >= kLimitReached);
+      const double share = ShareAbout(planned.plan, slow.nearest, slow.at_s_mm);
+      if (share >= 0.0) {
+        EXPECT_GE(share, slow.reached_share - 0.01) << FeedLimitName(slow.nearest) << " at " << slow.at_s_mm;
+        worst_off = std::max(worst_off, slow.reached_share - share);
+        ++checked;
+      }
+    }
+    for (const BindingLength& b : planned.binding) {
+      cut_mm += b.length_mm;
+    }
+    EXPECT_NEAR(cut_mm, planned.cutting_length_mm, 1e-6 * planned.cutting_length_mm);
+  }
+  for (std::size_t i = 0; i < kFeedLimitCount; ++i) {
+    if (length_mm[i] > 0.0) {
+      std::printf("%s binds over %.0f mm\n", std::string(FeedLimitName(static_cast<FeedLimit>(i))).c_str(),
+                  length_mm[i]);
+    }
+  }
+  std::printf("%zu stretches, %zu of them by struts: at worst %.4f of the limit less than said\n", stretches,
+              checked, worst_off);
+  EXPECT_GE(checked, 20u);
 }
 
 // Cycle by cycle at 10 kHz, against the program's own words.

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "trajectory/core/feed/binding.hpp"
+
 namespace lambdajet::trajectory {
 namespace {
 
@@ -468,45 +470,96 @@ class StretchPlanner {
     return after == run_.pieces.begin() ? run_.pieces.front() : *std::prev(after);
   }
 
+  // What binds, from the final polynomials and knots: of cuts for whoever asks, of traverses for the samples.
   void Report() {
-    SlowStretch* open = nullptr;
-    for (std::size_t k = 0; k + 1 < solved_.size(); ++k) {
-      const SpatialNode& node = solved_[k];
-      const double cell = solved_[k + 1].offset_mm - node.offset_mm;
-      plan_.binding_mm[static_cast<std::size_t>(node.binding)] += cell;
-      const SpatialPiece& piece = PieceAt(node.offset_mm);
-      const double speed = std::sqrt(node.x);
-      if (!piece.cutting || speed >= 0.999 * piece.programmed_mm_per_s) {
-        open = nullptr;
-        continue;
+    std::vector<SlowStretch> rapid;
+    const auto reach = static_cast<std::size_t>(model_.filter.half_support_s() / knot_);
+    BindingReport cuts(reach, plan_.slow), traverses(reach, rapid);
+    BindingReport* open = nullptr;
+    corner_at_ = piece_at_ = 0;
+    std::sort(corners_.begin(), corners_.end(),
+              [](const Corner& a, const Corner& b) { return a.time_s < b.time_s; });
+    for (std::size_t n = 0; n < knots_.size(); ++n) {
+      const SpatialPiece& piece = PieceAt(knots_[n].s_mm - begin_s_);
+      BindingReport* const mine = piece.cutting ? &cuts : &traverses;
+      const bool slow = knots_[n].path_speed_mm_per_s < kFeedHeld * piece.programmed_mm_per_s;
+      if (open != nullptr && (!slow || open != mine)) {
+        open->Close(knots_[n].s_mm);
       }
-      const double s = begin_s_ + node.offset_mm;
-      if (open == nullptr) {
-        plan_.slow.push_back({s, s, piece.line, node.binding, piece.programmed_mm_per_s, speed});
-        open = &plan_.slow.back();
-      }
-      open->to_s_mm = s + cell;
-      if (speed < open->lowest_mm_per_s) {
-        open->lowest_mm_per_s = speed;
-        open->limit = node.binding;
-        open->line = piece.line;
+      open = slow ? mine : nullptr;
+      if (slow) {
+        open->Take(MomentAt(n, piece));
       }
     }
-    ReportSamples();
+    if (open != nullptr) {
+      open->Close(begin_s_ + run_.length_mm());
+    }
+    SumLengths();
+    rapid.insert(rapid.end(), plan_.slow.begin(), plan_.slow.end());
+    std::sort(rapid.begin(), rapid.end(),
+              [](const SlowStretch& a, const SlowStretch& b) { return a.from_s_mm < b.from_s_mm; });
+    ReportSamples(rapid);
   }
 
-  void ReportSamples() {
-    std::size_t node = 0;
+  FeedMoment MomentAt(std::size_t n, const SpatialPiece& piece) {
+    const SpatialKnot& k = knots_[n];
+    FeedMoment m{
+        k.s_mm, std::max(0.0, k.path_speed_mm_per_s), piece.programmed_mm_per_s, piece.line, FeedLimit::kFeed,
+        0.0};
+    if (piece.feed_mm_per_s < piece.programmed_mm_per_s) {
+      m.Offer(FeedLimit::kFeed, m.speed_mm_per_s / piece.feed_mm_per_s);  // the machine's own
+    }
+    OfferStruts(n, m);
+    const double acceleration = Size(k.tool.rate.a_mm_per_s2, k.tool.rate.alpha_rad_per_s2);
+    const double along = k.path_acceleration_mm_per_s2;
+    m.Offer(2.0 * along * along < acceleration * acceleration ? FeedLimit::kCurvature
+                                                              : FeedLimit::kPathAcceleration,
+            acceleration / model_.motion.path_acceleration_mm_per_s2);
+    m.Offer(FeedLimit::kPathJerk,
+            Size(k.jerk_mm_per_s3, k.turn_jerk_rad_per_s3) / model_.motion.path_jerk_mm_per_s3);
+    m.Offer(FeedLimit::kContourTolerance, Deviation(k).ratio);
+    for (; corner_at_ < corners_.size() && corners_[corner_at_].time_s <= InputTime(n); ++corner_at_) {
+      m.Offer(FeedLimit::kCorner, corners_[corner_at_].nearest.ratio);
+    }
+    return m;
+  }
+
+  void OfferStruts(std::size_t n, FeedMoment& m) const {
+    const auto per_segment = static_cast<std::size_t>(model_.options.knots_per_segment);
+    const std::size_t i = std::min(n / per_segment, plan_.segments.size() - 1);
+    const double t = static_cast<double>(n - i * per_segment) * knot_;
+    for (std::size_t j = 0; j < kStrutCount; ++j) {
+      const Polynomial& q = plan_.segments[i].q_mm[j];
+      m.Offer(ActuatorVelocityLimit(j), std::abs(q.first(t)) / model_.motion.strut_velocity_mm_per_s);
+      m.Offer(ActuatorAccelerationLimit(j),
+              std::abs(q.second(t)) / model_.motion.strut_acceleration_mm_per_s2);
+      m.Offer(FeedLimit::kActuatorJerk, std::abs(q.third(t)) / model_.motion.strut_jerk_mm_per_s3);
+    }
+  }
+
+  void SumLengths() {
+    double& held_mm = plan_.binding_mm[static_cast<std::size_t>(FeedLimit::kFeed)];
+    for (const SpatialPiece& piece : run_.pieces) {
+      held_mm += piece.cutting ? piece.length_mm : 0.0;
+    }
+    for (const SlowStretch& stretch : plan_.slow) {
+      plan_.binding_mm[static_cast<std::size_t>(stretch.limit)] += stretch.to_s_mm - stretch.from_s_mm;
+      held_mm -= stretch.to_s_mm - stretch.from_s_mm;
+    }
+  }
+
+  void ReportSamples(const std::vector<SlowStretch>& slow) {
+    std::size_t at = 0;
     for (std::size_t n = 0; n < knots_.size(); n += 2) {
       const SpatialKnot& k = knots_[n];
-      const double offset = k.s_mm - begin_s_;
-      while (node + 1 < solved_.size() && solved_[node + 1].offset_mm <= offset) {
-        ++node;
+      while (at < slow.size() && slow[at].to_s_mm < k.s_mm) {
+        ++at;
       }
-      const SpatialPiece& piece = PieceAt(offset);
+      const bool bound = at < slow.size() && slow[at].from_s_mm <= k.s_mm;
+      const SpatialPiece& piece = PieceAt(k.s_mm - begin_s_);
       plan_.samples.push_back({static_cast<double>(n) * knot_, k.s_mm, k.tool.p_mm, k.tool.q,
-                               k.tool.twist.v_mm_per_s.norm(), k.path_speed_mm_per_s, solved_[node].binding,
-                               piece.cutting, piece.line});
+                               k.tool.twist.v_mm_per_s.norm(), k.path_speed_mm_per_s,
+                               bound ? slow[at].limit : FeedLimit::kFeed, piece.cutting, piece.line});
     }
   }
 
