@@ -54,8 +54,7 @@ struct BindingLength {
 };
 
 // A stretch of cutting path where the programmed feed is not held, for one reason; where another limit takes over, another
-// stretch begins. What is said of the limit is measured on the plan that is given away, by sliders' plans (feed/binding);
-// hexapods' plans name what the speed profile found and leave the rest at 0.
+// stretch begins. What is said of the limit is measured on the plan that is given away (feed/binding).
 struct SlowStretch {
   double from_s_mm = 0.0;
   double to_s_mm = 0.0;

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "trajectory/core/feed/binding.hpp"
+#include "trajectory/core/feed/quintic.hpp"
 
 namespace lambdajet::trajectory {
 namespace {
@@ -22,22 +23,6 @@ constexpr double kCorner = 0.3;             // changes of direction above this m
 constexpr double kCornerLook_mm = 2.0;
 constexpr double kDeviationLook_mm = 1.0;
 constexpr double kLeastEase = 0.6;
-
-// Value, first and second derivative at one end of a segment.
-struct End {
-  double value = 0.0;
-  double first = 0.0;
-  double second = 0.0;
-};
-
-Polynomial Hermite(const End& a, const End& b, double T) {
-  const double h = b.value - a.value - a.first * T - 0.5 * a.second * T * T;
-  const double g = (b.first - a.first - a.second * T) * T;
-  const double m = (b.second - a.second) * T * T;
-  const double T3 = T * T * T;
-  return {{a.value, a.first, 0.5 * a.second, (10 * h - 4 * g + 0.5 * m) / T3,
-           (-15 * h + 7 * g - m) / (T3 * T), (6 * h - 3 * g + 0.5 * m) / (T3 * T * T)}};
-}
 
 // Largest magnitudes over a segment: acceleration and jerk exactly; speed at checks, and by jerk * step^2 / 8 more between.
 struct Peaks {
@@ -209,8 +194,8 @@ class StretchPlanner {
   // ---- segments ----
 
   struct KnotEnds {
-    std::array<End, kStrutCount> q;
-    End s;
+    std::array<QuinticEnd, kStrutCount> q;
+    QuinticEnd s;
   };
 
   KnotEnds EndsAt(const SpatialKnot& knot) {
@@ -242,9 +227,9 @@ class StretchPlanner {
       segment.start_s = duration * static_cast<double>(n);
       segment.duration_s = duration;
       for (std::size_t j = 0; j < kStrutCount; ++j) {
-        segment.q_mm[j] = Hermite(from.q[j], to.q[j], duration);
+        segment.q_mm[j] = QuinticBetween(from.q[j], to.q[j], duration);
       }
-      segment.s_mm = Hermite(from.s, to.s, duration);
+      segment.s_mm = QuinticBetween(from.s, to.s, duration);
       plan_.segments.push_back(segment);
       from = to;
     }
