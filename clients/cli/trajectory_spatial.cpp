@@ -166,6 +166,8 @@ Colour ColourOf(FeedLimit limit) {
     case FeedLimit::kPathAcceleration:
     case FeedLimit::kPathJerk:
       return kBlue;
+    case FeedLimit::kSmoothing:
+      return kInk;
     default:
       return kViolet;
   }
@@ -255,7 +257,8 @@ void DrawPathFrame(Picture& picture, PlotFrame::Place place, const PlannedSpatia
                   {"corner or tolerance", kRed},
                   {"curvature", kOrange},
                   {"path acceleration or jerk", kBlue},
-                  {"a strut", kViolet}},
+                  {"a strut", kViolet},
+                  {"none reached: smoothing in time", kInk}},
                  true);
   }
 }
