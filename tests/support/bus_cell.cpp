@@ -41,76 +41,112 @@ T Must(absl::StatusOr<T> value) {
   return std::move(*value);
 }
 
+TopicSpec MotionTopic(const std::string& name, const char* profile) {
+  return {name, schema::k_lambdajet_main_motion_v1_state, profile};
+}
+
 }  // namespace
 
-struct BusCell::Wires {
+struct BusEar::Readers {
   CommonClock clock;
-  std::uint64_t session = static_cast<std::uint64_t>(clock.now_ns());
-  std::uint64_t segments_sent = 0;
-  std::uint64_t process_sent = 0;
+  mutable std::mutex mutex;
   std::unique_ptr<Participant> bus;
-  std::optional<Writer<idl::calibration::v1::MachineDescriptionPubSubType>> description;
-  std::optional<Writer<idl::cell::v1::CommandPubSubType>> command;
-  std::optional<Writer<idl::trajectory::v1::SegmentBatchPubSubType>> segment;
-  std::optional<Writer<idl::trajectory::v1::ProcessBatchPubSubType>> process;
   DriveState drive;
   MainMotionState main_motion;
   std::int64_t drive_heard_ns = 0;
   std::vector<ProcessRecord> records;
-  std::vector<Measurement> measurements;
-  std::vector<Switch> switches;
-  std::size_t sheet_samples = 0;
   std::optional<Reader<idl::drive::v1::StatePubSubType>> drive_reader;
   std::optional<Reader<idl::main_motion::v1::StatePubSubType>> main_reader;
   std::optional<Reader<idl::main_motion::v1::ProcessRecordPubSubType>> record_reader;
+};
+
+BusEar::BusEar(int domain, const std::string& machine_id) : readers_(std::make_unique<Readers>()) {
+  Readers& r = *readers_;
+  BusOptions options;
+  options.house = "test";
+  options.partition = machine_id;
+  options.domain = domain;
+  options.profile_file = std::string(std::getenv("LAMBDAJET_SOURCE_DIR")) + "/deploy/dds/profiles.xml";
+  r.bus = Must(Participant::Open(options, nullptr, nullptr));
+  r.drive_reader.emplace(Must(Reader<idl::drive::v1::StatePubSubType>::Open(
+      *r.bus, {idl::drive::v1::STATE_TOPIC, schema::k_lambdajet_drive_v1_state, "state"},
+      [&r](const idl::drive::v1::State& s, const Arrival&) {
+        const std::lock_guard lock(r.mutex);
+        link::FromWire(s, r.drive);
+        r.drive_heard_ns = r.clock.now_ns();
+      })));
+  r.main_reader.emplace(Must(Reader<idl::main_motion::v1::StatePubSubType>::Open(
+      *r.bus, MotionTopic(idl::main_motion::v1::STATE_TOPIC, "state"),
+      [this, &r](const idl::main_motion::v1::State& s, const Arrival&) {
+        const std::lock_guard lock(r.mutex);
+        if (link::FromWire(s, r.main_motion) && on_main_motion) {
+          on_main_motion(r.main_motion);
+        }
+      })));
+  r.record_reader.emplace(Must(Reader<idl::main_motion::v1::ProcessRecordPubSubType>::Open(
+      *r.bus, MotionTopic(idl::main_motion::v1::PROCESS_RECORD_TOPIC, "setpoint"),
+      [&r](const idl::main_motion::v1::ProcessRecord& heard, const Arrival&) {
+        ProcessRecord record;
+        const std::lock_guard lock(r.mutex);
+        if (link::FromWire(heard, record)) {
+          r.records.push_back(record);
+        }
+      })));
+}
+
+BusEar::~BusEar() = default;
+
+Participant& BusEar::bus() { return *readers_->bus; }
+DriveState BusEar::drive() const {
+  const std::lock_guard lock(readers_->mutex);
+  return readers_->drive;
+}
+MainMotionState BusEar::main_motion() const {
+  const std::lock_guard lock(readers_->mutex);
+  return readers_->main_motion;
+}
+std::int64_t BusEar::now_ns() const { return readers_->clock.now_ns(); }
+std::int64_t BusEar::drive_heard_ns() const {
+  const std::lock_guard lock(readers_->mutex);
+  return readers_->drive_heard_ns;
+}
+std::vector<ProcessRecord> BusEar::records() const {
+  const std::lock_guard lock(readers_->mutex);
+  return readers_->records;
+}
+
+struct BusCell::Wires {
+  std::uint64_t session = 0;
+  std::uint64_t segments_sent = 0;
+  std::uint64_t process_sent = 0;
+  std::optional<Writer<idl::calibration::v1::MachineDescriptionPubSubType>> description;
+  std::optional<Writer<idl::cell::v1::CommandPubSubType>> command;
+  std::optional<Writer<idl::trajectory::v1::SegmentBatchPubSubType>> segment;
+  std::optional<Writer<idl::trajectory::v1::ProcessBatchPubSubType>> process;
+  std::vector<Measurement> measurements;
+  std::vector<Switch> switches;
+  std::size_t sheet_samples = 0;
   std::optional<Reader<idl::main_motion::v1::MeasurementPubSubType>> measurement_reader;
   std::optional<Reader<idl::plant::v1::JetTruthPubSubType>> jet_reader;
   std::optional<Reader<idl::plant::v1::DriveTruthPubSubType>> sheet_reader;
 };
 
 BusCell::BusCell(int domain, const MachineDescription& machine)
-    : machine_(machine), wires_(std::make_unique<Wires>()) {
+    : ear_(domain, machine.machine_id), machine_(machine), wires_(std::make_unique<Wires>()) {
   Wires& w = *wires_;
-  BusOptions options;
-  options.house = "test";
-  options.partition = machine.machine_id;
-  options.domain = domain;
-  options.profile_file = std::string(std::getenv("LAMBDAJET_SOURCE_DIR")) + "/deploy/dds/profiles.xml";
-  w.bus = Must(Participant::Open(options, nullptr, nullptr));
-  const std::string motion = schema::k_lambdajet_main_motion_v1_state;
+  Participant& bus = ear_.bus();
+  w.session = static_cast<std::uint64_t>(now_ns());
   w.description.emplace(Must(Writer<idl::calibration::v1::MachineDescriptionPubSubType>::Open(
-      *w.bus, {idl::calibration::v1::MACHINE_DESCRIPTION_TOPIC,
-               schema::k_lambdajet_calibration_v1_machine_description, "description"})));
+      bus, {idl::calibration::v1::MACHINE_DESCRIPTION_TOPIC,
+            schema::k_lambdajet_calibration_v1_machine_description, "description"})));
   w.command.emplace(Must(Writer<idl::cell::v1::CommandPubSubType>::Open(
-      *w.bus, {idl::cell::v1::COMMAND_TOPIC, schema::k_lambdajet_cell_v1_command, "command"})));
+      bus, {idl::cell::v1::COMMAND_TOPIC, schema::k_lambdajet_cell_v1_command, "command"})));
   w.segment.emplace(Must(Writer<idl::trajectory::v1::SegmentBatchPubSubType>::Open(
-      *w.bus, {idl::trajectory::v1::SEGMENT_TOPIC, schema::k_lambdajet_trajectory_v1_plan, "setpoint"})));
+      bus, {idl::trajectory::v1::SEGMENT_TOPIC, schema::k_lambdajet_trajectory_v1_plan, "setpoint"})));
   w.process.emplace(Must(Writer<idl::trajectory::v1::ProcessBatchPubSubType>::Open(
-      *w.bus, {idl::trajectory::v1::PROCESS_TOPIC, schema::k_lambdajet_trajectory_v1_plan, "setpoint"})));
-  w.drive_reader.emplace(Must(Reader<idl::drive::v1::StatePubSubType>::Open(
-      *w.bus, {idl::drive::v1::STATE_TOPIC, schema::k_lambdajet_drive_v1_state, "state"},
-      [this](const idl::drive::v1::State& s, const Arrival&) {
-        const std::lock_guard lock(mutex_);
-        link::FromWire(s, wires_->drive);
-        wires_->drive_heard_ns = wires_->clock.now_ns();
-      })));
-  w.main_reader.emplace(Must(Reader<idl::main_motion::v1::StatePubSubType>::Open(
-      *w.bus, {idl::main_motion::v1::STATE_TOPIC, motion, "state"},
-      [this](const idl::main_motion::v1::State& s, const Arrival&) {
-        const std::lock_guard lock(mutex_);
-        link::FromWire(s, wires_->main_motion);
-      })));
-  w.record_reader.emplace(Must(Reader<idl::main_motion::v1::ProcessRecordPubSubType>::Open(
-      *w.bus, {idl::main_motion::v1::PROCESS_RECORD_TOPIC, motion, "setpoint"},
-      [this](const idl::main_motion::v1::ProcessRecord& r, const Arrival&) {
-        ProcessRecord record;
-        const std::lock_guard lock(mutex_);
-        if (link::FromWire(r, record)) {
-          wires_->records.push_back(record);
-        }
-      })));
+      bus, {idl::trajectory::v1::PROCESS_TOPIC, schema::k_lambdajet_trajectory_v1_plan, "setpoint"})));
   w.measurement_reader.emplace(Must(Reader<idl::main_motion::v1::MeasurementPubSubType>::Open(
-      *w.bus, {idl::main_motion::v1::MEASUREMENT_TOPIC, motion, "setpoint"},
+      bus, MotionTopic(idl::main_motion::v1::MEASUREMENT_TOPIC, "setpoint"),
       [this](const idl::main_motion::v1::Measurement& m, const Arrival&) {
         Measurement measurement;
         const std::lock_guard lock(mutex_);
@@ -119,7 +155,7 @@ BusCell::BusCell(int domain, const MachineDescription& machine)
         }
       })));
   w.jet_reader.emplace(Must(Reader<idl::plant::v1::JetTruthPubSubType>::Open(
-      *w.bus, {idl::plant::v1::JET_TRUTH_TOPIC, schema::k_lambdajet_plant_v1_truth, "setpoint"},
+      bus, {idl::plant::v1::JET_TRUTH_TOPIC, schema::k_lambdajet_plant_v1_truth, "setpoint"},
       [this](const idl::plant::v1::JetTruth& truth, const Arrival&) {
         const std::lock_guard lock(mutex_);
         for (std::size_t i = 0; i < truth.switch_count(); ++i) {
@@ -127,7 +163,7 @@ BusCell::BusCell(int domain, const MachineDescription& machine)
         }
       })));
   w.sheet_reader.emplace(Must(Reader<idl::plant::v1::DriveTruthPubSubType>::Open(
-      *w.bus, {idl::plant::v1::DRIVE_TRUTH_TOPIC, schema::k_lambdajet_plant_v1_truth, "setpoint"},
+      bus, {idl::plant::v1::DRIVE_TRUTH_TOPIC, schema::k_lambdajet_plant_v1_truth, "setpoint"},
       [this](const idl::plant::v1::DriveTruth& truth, const Arrival&) {
         const std::lock_guard lock(mutex_);
         wires_->sheet_samples += truth.count();
@@ -261,23 +297,6 @@ void BusCell::Stream() {
   }
 }
 
-DriveState BusCell::drive() const {
-  const std::lock_guard lock(mutex_);
-  return wires_->drive;
-}
-MainMotionState BusCell::main_motion() const {
-  const std::lock_guard lock(mutex_);
-  return wires_->main_motion;
-}
-std::int64_t BusCell::now_ns() const { return wires_->clock.now_ns(); }
-std::int64_t BusCell::drive_heard_ns() const {
-  const std::lock_guard lock(mutex_);
-  return wires_->drive_heard_ns;
-}
-std::vector<ProcessRecord> BusCell::records() const {
-  const std::lock_guard lock(mutex_);
-  return wires_->records;
-}
 std::vector<Measurement> BusCell::measurements() const {
   const std::lock_guard lock(mutex_);
   return wires_->measurements;

@@ -44,9 +44,9 @@ inline int FreePort(int domain, int from_port) {
 
 class CellProcesses {
  public:
-  // Starts a house, also again after it has ended; same port, same files.
-  ChildProcess& Start(const std::string& house) {
-    houses_[house] = std::make_unique<ChildProcess>(Options(house));
+  // Starts a house, also again after it has ended; same port, same files. A module's truth is the shipped plant, or another file.
+  ChildProcess& Start(const std::string& house, const std::string& plant = ShippedPlant()) {
+    houses_[house] = std::make_unique<ChildProcess>(Options(house, plant));
     return *houses_[house];
   }
   // Starts them all and waits until each has announced itself.
@@ -58,6 +58,7 @@ class CellProcesses {
       ASSERT_TRUE(at(house).WaitUntilReady()) << house << ": " << at(house).err();
     }
   }
+  static std::string ShippedPlant() { return SourceDir() + "/deploy/plants/shipped.yaml"; }
   ChildProcess& at(const std::string& house) { return *houses_.at(house); }
   void Kill(const std::string& house) {
     at(house).Signal(SIGKILL);
@@ -88,7 +89,7 @@ class CellProcesses {
     return ports_[house] = next_port_ - 1;
   }
 
-  ChildOptions Options(const std::string& house) {
+  ChildOptions Options(const std::string& house, const std::string& plant) {
     ChildOptions options;
     options.program = house;
     options.announce_file = folder_.File(house + ".announce.json");
@@ -103,7 +104,7 @@ class CellProcesses {
       add("--store=" + folder_.File("cell.sqlite"));
       add("--trajectory.address=" + address("trajectory"));
     } else if (house == "drive" || house == "main_motion") {
-      add("--plant=" + SourceDir() + "/deploy/plants/shipped.yaml");
+      add("--plant=" + plant);
       add("--seed=7");
       // A virtual host may stand still for a tenth of a second; what the deadlines do is not what these tests are about.
       add("--watch.overruns_allowed=100");

@@ -70,14 +70,15 @@ bool LinkFromWire(const Wire& wire, LinkFigures& figures) {
   return Finite({figures.clock_error_bound_s, figures.clock_offset_s, figures.round_trip_s});
 }
 
-bool TakeCondition(const idl::trajectory::v1::Gate& wire, InputCondition& condition) {
+// A gate of an input that does not say what of the input it waits for would never open.
+bool TakeCondition(const idl::trajectory::v1::Gate& wire, GateKind kind, InputCondition& condition) {
   ProcessInput input{};
   InputEvent event{};
   if (!Take(wire.input(), kProcessInputs, input) || !Take(wire.input_event(), kInputEvents, event)) {
     return false;
   }
   condition = InputCondition::Of(input, event);
-  return true;
+  return kind != GateKind::kInput || event != InputEvent::kNone;
 }
 
 void ToWire(const Segment& segment, idl::trajectory::v1::Segment& wire) {
@@ -397,7 +398,7 @@ bool FromWire(const idl::trajectory::v1::ProcessBatch& wire, ProcessBatch& sampl
     to.id = gate.id();
     to.s_mm = gate.s_mm();
     to.argument = gate.argument();
-    sound = Take(gate.kind(), kGateKinds, to.kind) && TakeCondition(gate, to.condition) &&
+    sound = Take(gate.kind(), kGateKinds, to.kind) && TakeCondition(gate, to.kind, to.condition) &&
             Finite({to.s_mm, to.argument}) && sound;
   }
   for (std::size_t i = 0; i < sample.event_count; ++i) {

@@ -54,6 +54,8 @@ void ToWire(const Gate& gate, plan_wire::Gate& to) {
   to.kind(static_cast<std::uint32_t>(gate.kind));
   to.s_mm(gate.s_mm);
   to.argument(gate.argument);
+  to.input(static_cast<std::uint32_t>(gate.condition.input()));
+  to.input_event(static_cast<std::uint32_t>(gate.condition.event()));
 }
 
 void ToWire(const ProcessEvent& event, plan_wire::ProcessEvent& to) {
