@@ -1,8 +1,10 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <string>
 
+#include "foundation/contract/trouble.hpp"
 #include "platform/machine_file/hexapod_file.hpp"
 
 namespace lambdajet {
@@ -73,6 +75,71 @@ TEST(HexapodFile, RefusesWithKeyAndLine) {
   ExpectRefused("struts: []", "is not a list of six struts");
   ExpectRefused("[", "is not YAML");
   ExpectRefused("", "is not a map of keys");
+}
+
+TEST(HexapodFile, ReadsASpindleOrNone) {
+  const std::string text = ExampleText();
+  const auto with = ParseHexapod(text, "test.yaml");
+  ASSERT_TRUE(with.ok()) << with.status().ToString();
+  EXPECT_EQ(with->motion.spindle_least_per_min, 500.0);
+  EXPECT_EQ(with->motion.spindle_most_per_min, 12000.0);
+  EXPECT_EQ(with->motion.spindle_run_up_s, 1.5);
+  const std::string bare = text.substr(0, text.find("spindle:"));
+  const auto without = ParseHexapod(bare, "test.yaml");
+  ASSERT_TRUE(without.ok()) << without.status().ToString();
+  EXPECT_EQ(without->motion.spindle_most_per_min, 0.0);
+  EXPECT_EQ(HexapodText(*without), bare);
+  EXPECT_NE(HexapodHash(*without), HexapodHash(*with));
+  // Bounds themselves are right: turning from rest on, at once, or at one speed only.
+  for (const char* spindle : {"{least_per_min: 0, most_per_min: 12000, run_up_s: 0}",
+                              "{least_per_min: 3000, most_per_min: 3000, run_up_s: 600}",
+                              "{least_per_min: 1, most_per_min: 1e6, run_up_s: 1.5}"}) {
+    const auto edge = ParseHexapod(bare + "spindle: " + spindle + "\n", "test.yaml");
+    ASSERT_TRUE(edge.ok()) << edge.status().ToString();
+    EXPECT_EQ(ParseHexapod(HexapodText(*edge), "again")->motion.spindle_run_up_s,
+              edge->motion.spindle_run_up_s);
+  }
+}
+
+TEST(HexapodFile, RefusesASpindleThatCannotBeByKeyAndLine) {
+  const std::string text = ExampleText(), bare = text.substr(0, text.find("spindle:"));
+  const auto refused = [&](const std::string& spindle, const std::string& word, const std::string& reason) {
+    SCOPED_TRACE(spindle);
+    const auto machine = ParseHexapod(bare + "spindle: " + spindle + "\n", "test.yaml");
+    ASSERT_FALSE(machine.ok());
+    EXPECT_EQ(machine.status().code(), absl::StatusCode::kInvalidArgument);
+    EXPECT_EQ(TroubleReason(machine.status()), "BAD_HEXAPOD_FILE");
+    const std::string message(machine.status().message());
+    EXPECT_NE(message.find(word), std::string::npos) << message;
+    const auto violations = TroubleViolations(machine.status());
+    ASSERT_FALSE(violations.empty());
+    EXPECT_EQ(violations[0].reason, reason) << message;
+    EXPECT_EQ(violations[0].field.rfind("spindle", 0), 0u) << violations[0].field;
+    const int line = static_cast<int>(std::count(bare.begin(), bare.end(), '\n')) + 1;
+    EXPECT_NE(message.find("test.yaml:" + std::to_string(line) + ": spindle"), std::string::npos) << message;
+  };
+  const std::string good = "{least_per_min: 500, most_per_min: 12000, run_up_s: 1.5}";
+  refused("12000", "spindle is not a map of keys", "WRONG_TYPE");
+  refused(Replaced(good, "least_per_min: 500, ", ""), "spindle.least_per_min is missing", "MISSING");
+  refused(Replaced(good, "most_per_min: 12000, ", ""), "spindle.most_per_min is missing", "MISSING");
+  refused(Replaced(good, ", run_up_s: 1.5", ""), "spindle.run_up_s is missing", "MISSING");
+  refused(Replaced(good, "1.5", "1.5, most_rad_per_s: 1256"), "spindle.most_rad_per_s is not a known key",
+          "UNKNOWN_KEY");
+  refused(Replaced(good, "run_up_s: 1.5", "run_up_ms: 1500"), "spindle.run_up_s is missing", "MISSING");
+  refused(Replaced(good, "12000", "12000 rpm"), "spindle.most_per_min is '12000 rpm'", "WRONG_VALUE");
+  refused(Replaced(good, "12000", ".nan"), "spindle.most_per_min is ", "WRONG_VALUE");
+  refused(Replaced(good, "12000", ".inf"), "spindle.most_per_min is ", "WRONG_VALUE");
+  refused(Replaced(good, "500", "500, least_per_min: 600"), "spindle.least_per_min stands here a second time",
+          "DUPLICATE");
+  refused("{least_per_min: 0, most_per_min: 0, run_up_s: 1.5}", "spindle.most_per_min is 0; right is above 0",
+          "WRONG_VALUE");
+  refused(Replaced(good, "12000", "-12000"), "spindle.most_per_min is -12000; right is", "WRONG_VALUE");
+  refused(Replaced(good, "12000", "1e12"), "spindle.most_per_min is 1e+12; right is", "WRONG_VALUE");
+  refused(Replaced(good, "500", "13000"), "spindle.least_per_min is 13000; right is 0 up to most_per_min",
+          "WRONG_VALUE");
+  refused(Replaced(good, "500", "-1"), "spindle.least_per_min is -1; right is", "WRONG_VALUE");
+  refused(Replaced(good, "1.5", "-0.1"), "spindle.run_up_s is -0.1; right is 0 to 600 s", "WRONG_VALUE");
+  refused(Replaced(good, "1.5", "1e5"), "spindle.run_up_s is 1e+05; right is 0 to 600 s", "WRONG_VALUE");
 }
 
 }  // namespace

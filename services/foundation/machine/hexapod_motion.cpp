@@ -4,12 +4,6 @@
 #include <cmath>
 
 namespace lambdajet {
-namespace {
-
-constexpr double kLongestRunUp_s = 600.0;
-
-}  // namespace
-
 std::string_view FaultOf(const HexapodMotion& m) {
   const std::array<double, 9> positive = {m.strut_velocity_mm_per_s, m.strut_acceleration_mm_per_s2,
                                           m.strut_jerk_mm_per_s3,    m.feed_mm_per_s,
@@ -25,9 +19,10 @@ std::string_view FaultOf(const HexapodMotion& m) {
     return "the program zero must be a pose of finite numbers";
   }
   const double least = m.spindle_least_per_min, most = m.spindle_most_per_min;
-  if (!(least >= 0.0 && least <= most && std::isfinite(most) && m.spindle_run_up_s >= 0.0 &&
+  if (!(least >= 0.0 && least <= most && most <= kFastestSpindle_per_min && m.spindle_run_up_s >= 0.0 &&
         m.spindle_run_up_s <= kLongestRunUp_s)) {
-    return "a spindle's speeds must be finite, the least not above the most, and its run-up 0 to 600 s";
+    return "a spindle's speeds must be 0 to 10^6 a minute, the least not above the most, its run-up 0 to 600 "
+           "s";
   }
   return {};
 }

@@ -12,6 +12,9 @@
 
 namespace lambdajet {
 
+inline constexpr double kFastestSpindle_per_min = 1e6;
+inline constexpr double kLongestRunUp_s = 600.0;
+
 struct HexapodMotion {
   double strut_velocity_mm_per_s = 1.0;
   double strut_acceleration_mm_per_s2 = 1.0;

@@ -108,6 +108,30 @@ void ReadStruts(MapReader& file, Findings& findings, HexapodGeometry& geometry) 
   }
 }
 
+// A section that stands in the file is a spindle's: one that cannot turn is left out instead.
+void ReadSpindle(MapReader& file, Findings& findings, HexapodMotion& motion) {
+  MapReader spindle(file.Child("spindle"), "spindle.", findings);
+  for (const MotionKey& key : kSpindleKeys) {
+    motion.*key.member = spindle.Number(key.name);
+  }
+  const auto judge = [&](const std::string& key, double value, bool good, const std::string& right) {
+    if (spindle.Has(key) && !good) {
+      findings.Add("spindle." + key, spindle.LineOfKey(key),
+                   "is " + ShortestText(value) + "; right is " + right, "WRONG_VALUE");
+    }
+  };
+  const double most = motion.spindle_most_per_min, least = motion.spindle_least_per_min;
+  if (findings.any()) {
+    return;  // numbers that could not be read are not judged
+  }
+  judge("most_per_min", most, most > 0.0 && most <= kFastestSpindle_per_min,
+        "above 0 and at most " + ShortestText(kFastestSpindle_per_min) + " turns a minute");
+  judge("least_per_min", least, least >= 0.0 && least <= most, "0 up to most_per_min");
+  judge("run_up_s", motion.spindle_run_up_s,
+        motion.spindle_run_up_s >= 0.0 && motion.spindle_run_up_s <= kLongestRunUp_s,
+        "0 to " + ShortestText(kLongestRunUp_s) + " s");
+}
+
 HexapodMachine ReadHexapod(const YAML::Node& root, Findings& findings) {
   HexapodMachine machine;
   MapReader file(root, "", findings);
@@ -130,10 +154,7 @@ HexapodMachine ReadHexapod(const YAML::Node& root, Findings& findings) {
   }
   machine.motion.X_MT_zero = ReadPose(file, "program_zero", findings);
   if (file.Has("spindle")) {
-    MapReader spindle(file.Child("spindle"), "spindle.", findings);
-    for (const MotionKey& key : kSpindleKeys) {
-      machine.motion.*key.member = spindle.Number(key.name);
-    }
+    ReadSpindle(file, findings, machine.motion);
   }
   return machine;
 }
