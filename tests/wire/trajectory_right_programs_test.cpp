@@ -14,6 +14,7 @@
 
 #include "tests/laws/trajectory_cases.hpp"
 #include "trajectory/core/part_program/gcode_reader.hpp"
+#include "trajectory/core/part_program/gcode_writer.hpp"
 
 namespace lambdajet::trajectory {
 namespace {
@@ -110,6 +111,49 @@ TEST(RightPrograms, AreListedOneOperationALine) {
       "4 FEED_ARC x_mm=0 y_mm=10 center_x_mm=0 center_y_mm=0 sweep_rad=1.57079633 feed_mm_per_s=0.523598776\n"
       "5 FEED_CHANGE feed_mm_per_s=10\n5 FEED_LINE x_mm=5 y_mm=10 feed_mm_per_s=10\n6 DWELL time_s=1\n"
       "7 ABRASIVE_OFF\n7 JET_OFF\n8 END\n");
+}
+
+// What the list says of tools, with the jet and with a spindle.
+std::string Switched(const std::string& text, std::uint8_t axes) {
+  std::string list;
+  for (const Operation& o : Done(text, axes)) {
+    if (o.kind != OperationKind::kTraverse && o.kind != OperationKind::kFeedLine) {
+      list += FormatOperation(o) + "\n";
+    }
+  }
+  return list;
+}
+
+TEST(RightPrograms, StandStillForAnotherTool) {
+  // Nothing is mounted at first; T alone only selects; the mounted tool is not asked for again; T0 takes it off.
+  EXPECT_EQ(Switched("T1 M6\nT2\nM6\nM6\nT2 M6\nT0 M6\nM2\n", kPlanarAxes),
+            "1 TOOL_CHANGE tool=1\n3 TOOL_CHANGE tool=2\n6 TOOL_CHANGE tool=0\n7 END\n");
+  EXPECT_EQ(Switched("T0 M6\nM61 Q3\nT3 M6\nM2\n", kPlanarAxes), "2 TOOL_NUMBER tool=3\n4 END\n");
+  // The jet and the spindle go off, before a pierce of the same line.
+  EXPECT_EQ(Switched("F600\nM3 P1\nG1 X1\nM6 T5 M3 P2\nM6\nM2\n", kPlanarAxes),
+            "2 PIERCE time_s=1\n4 ABRASIVE_OFF\n4 JET_OFF\n4 TOOL_CHANGE tool=5\n4 PIERCE time_s=2\n"
+            "5 ABRASIVE_OFF\n5 JET_OFF\n6 END\n");
+  EXPECT_EQ(Switched("S900 M3\nM8\nT5 M6\nM2\n", kSixAxes),
+            "1 SPINDLE_ON speed_per_min=900\n2 COOLANT_ON\n3 SPINDLE_OFF\n3 TOOL_CHANGE tool=5\n"
+            "4 COOLANT_OFF\n4 END\n");
+  // G41 and G43 take the mounted tool's row, as #5400 and #5410 do.
+  const std::vector<Operation> kerf =
+      Done("G10 L1 P4 R0.3\nT4 M6\nG41\nG1 X#5400 Y[#5410*10+#<_current_tool>] F600\nG40 X0\nM2\n");
+  EXPECT_NEAR(kerf[1].kerf_offset_mm, 0.3, kSame);
+  EXPECT_NEAR(kerf[1].x_W_mm, 4.0, kSame);
+  EXPECT_NEAR(kerf[1].y_W_mm, 10.0, kSame);
+  EXPECT_NEAR(Done("G41\nG1 X9 F600\nG40 X0\nM2\n")[0].kerf_offset_mm, 0.4, kSame);
+  EXPECT_NEAR(Done("G10 L1 P4 Z7\nT4 M6\nG43\nG0 Z1\nM2\n", kSixAxes)[1].z_W_mm, 8.0, kSame);
+}
+
+// Written and read again, nothing changes; a kerf that ends before the change ends there too.
+TEST(RightPrograms, ToolsAreWrittenAsTheyAreRead) {
+  const std::vector<Operation> done = Done(
+      "T1 M6\nF600\nG0 X9\nM3\nG41.1 D0.8\nG1 X20\nX30\nG40 X40\nM61 Q2\nT3 M6\nG0 X50\nM3\n"
+      "G41.1 D0.8 G1 X60\nX70\nM5\nG40\nT0 M6\nG0 X1\nM2\n");
+  const std::string text = WriteGcode(done, "tools");
+  ExpectSame(Done(text), done);
+  EXPECT_EQ(WriteGcode(Done(text), "tools"), text);
 }
 
 TEST(RightPrograms, TurnAsOftenAsPSays) {
@@ -299,7 +343,8 @@ TEST(RightPrograms, SplinesStayWithinAHundredthOfTheTolerance) {
 TEST(RightPrograms, LeaveOutZWhenTold) {
   GcodeOptions options;
   options.leave_out_z = true;
-  const PartProgram program = ReadGcode("G0 Z5\nG0 X10 Z5\nG1 Z-3 F100\nG43 H1\nX20\nM2\n", options);
+  const PartProgram program =
+      ReadGcode("T1 M6\nG0 Z5\nG0 X10 Z5\nM3 S12000\nG1 Z-3 F100\nG43 H1\nX20\nM2\n", options);
   ASSERT_TRUE(program.faults.empty());
   std::size_t motions = 0;
   for (const Operation& o : program.operations) {

@@ -71,7 +71,8 @@ ProgramFault SheetFault(const MachineDescription& m, const Vector2d& p, std::uin
   char text[200];
   std::snprintf(text, sizeof text, "the cut leaves the sheet at X%.3f Y%.3f mm; the sheet is %.3f x %.3f mm",
                 p.x(), p.y(), m.sheet_width_mm, m.sheet_height_mm);
-  return {line, 0, "OUTSIDE_SHEET", "", text};
+  const bool x = p.x() < -kSheetSlack_mm || p.x() > m.sheet_width_mm + kSheetSlack_mm;
+  return {line, 0, "OUTSIDE_SHEET", x ? "X" : "Y", text};
 }
 
 // Faults of place, one a line at most.
@@ -374,6 +375,7 @@ ProgramPath LayOutProgram(std::string_view program, const MachineDescription& ma
   ProgramPath path = MakeProgramPath(read.operations, DefaultsOf(machine, options));
   std::vector<Operation>().swap(read.operations);  // a long program's list is not held while it is planned
   PlaceCheck(machine, faults).Check(path);
+  TellWords(program, options.notation, faults);
   return path;
 }
 
@@ -422,6 +424,7 @@ Admission AdmitPartProgram(std::string_view program, const MachineDescription& m
   }
   const ProgramPath path = MakeProgramPath(read.operations, DefaultsOf(machine, options));
   PlaceCheck(machine, admission.faults).Check(path);
+  TellWords(program, options.notation, admission.faults);
   admission.cutting_length_mm = path.cut_length_mm;
   admission.pierce_count = path.pierce_count;
   for (const PathElement& e : path.elements) {

@@ -63,6 +63,7 @@ class PathBuilder {
       case OperationKind::kMeasure:
         return Gate(o, GateKind::kMeasure, o.value);
       case OperationKind::kStop:
+      case OperationKind::kToolChange:
         return Gate(o, GateKind::kStop, 0.0);
       case OperationKind::kWaitInput:
         return Gate(o, GateKind::kInput, o.value);

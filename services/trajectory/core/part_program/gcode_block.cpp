@@ -9,7 +9,6 @@
 namespace lambdajet::trajectory {
 namespace {
 
-constexpr double kInchMm = 25.4;
 constexpr double kLongestPierce_s = 600.0;
 constexpr double kLongestDwell_s = 3600.0;
 constexpr double kLargestTolerance_mm = 10.0;
@@ -107,6 +106,9 @@ int GroupOfM(int tenfold) {
     case 20:
     case 300:
       return kStopping;
+    case 60:
+    case 610:
+      return kTool;
     case 30:
     case 40:
     case 50:
@@ -168,10 +170,10 @@ const char* AdviceOnG(int tenfold) {
 bool Sort(Reading& r, Code c, int group, char letter) {
   r.columns[0] = c.column;  // for the faults below; the motion word overwrites it
   if (group == kNoCode) {
-    return r.FaultAt(kMotion, letter == 'G' ? "UNKNOWN_G_CODE" : "UNKNOWN_M_CODE",
-                     letter == 'G'     ? AdviceOnG(c.tenfold)
-                     : c.tenfold == 60 ? "this machine has one tool and no changer; delete the word"
-                                       : "not a word of this machine; see the table of supported words");
+    r.FaultAt(kMotion, letter == 'G' ? "UNKNOWN_G_CODE" : "UNKNOWN_M_CODE",
+              letter == 'G' ? AdviceOnG(c.tenfold)
+                            : "not a word of this machine; see the table of supported words");
+    return true;  // for the faults of the words behind
   }
   const auto g = static_cast<std::size_t>(group);
   if (r.codes[g] != kNoCode) {
@@ -188,7 +190,7 @@ bool SortCodes(Reading& r) {
   std::uint32_t motion_column = 0;
   for (int i = 0; i < r.block.g_count; ++i) {
     const Code c = r.block.g[static_cast<std::size_t>(i)];
-    const int group = ModeGroupOfG(c.tenfold);
+    const int group = GroupOfCode('G', c.tenfold);
     if (!Sort(r, c, group, 'G')) {
       return false;
     }
@@ -196,12 +198,12 @@ bool SortCodes(Reading& r) {
   }
   for (int i = 0; i < r.block.m_count; ++i) {
     const Code c = r.block.m[static_cast<std::size_t>(i)];
-    if (!Sort(r, c, GroupOfM(c.tenfold), 'M')) {
+    if (!Sort(r, c, GroupOfCode('M', c.tenfold), 'M')) {
       return false;
     }
   }
   r.columns[kMotion] = motion_column;
-  return true;
+  return r.left_in_doubt == 0;
 }
 
 bool TakesP(int motion) { return motion == 20 || motion == 30 || motion == 50 || motion == 820; }
@@ -222,7 +224,7 @@ bool OneTakesEach(Reading& r) {
                 (!r.has_spindle() && (r.code(kJet) == 30 || r.code(kJet) == 40)) +
                 (output != kNoCode && output < 670) + (machine == 1000 || machine == 1010) + path + call +
                 TakesP(motion);
-  const int q = (output >= 660) + path + (motion == 50 || motion == 830);
+  const int q = (output >= 660) + (r.code(kTool) == 610) + path + (motion == 50 || motion == 830);
   const int l = (output == 660) + (once == 100) + call + (motion >= 810);
   return NotShared(r, p, 'P', "P_AMBIGUOUS") && NotShared(r, q, 'Q', "Q_AMBIGUOUS") &&
          NotShared(r, l, 'L', "L_AMBIGUOUS");
@@ -317,6 +319,8 @@ bool Jet(Reading& r) {
   if (r.has_spindle()) {
     return ObeySpindle(r);
   }
+  r.block.used |=
+      r.options.leave_out_z ? LetterBit('S') : 0u;  // of the spindle that such a program was written for
   switch (r.code(kJet)) {
     case 30:
     case 40:
@@ -507,14 +511,17 @@ bool KerfRadius(Reading& r, int g, double& radius_mm) {
   if (dynamic && !r.block.has('D')) {
     return r.FaultAt(kKerf, "KERF_DIAMETER_MISSING", "G41.1 and G42.1 need D, the width of the kerf");
   }
-  const double d = r.block.has('D') ? r.block.Take('D') : 0.0;
+  const double d = r.block.has('D') ? r.block.Take('D') : r.state.mounted_tool;
   if (dynamic) {
     radius_mm = 0.5 * r.mm(d);
   } else {
     const auto tool = r.tools.find(
         std::abs(d - std::round(d)) <= kWhole && std::abs(d) < 1e6 ? static_cast<int>(std::round(d)) : -1);
     if (tool == r.tools.end()) {
-      return r.FaultAt('D', "TOOL_UNKNOWN", "D0 and D1 are the jet; G10 L1 describes others");
+      const char* should =
+          "D, or the mounted tool, needs a width: G10 L1 describes tools other than the jet, 0 and 1";
+      return r.block.has('D') ? r.FaultAt('D', "TOOL_UNKNOWN", should)
+                              : r.FaultAt(kKerf, "TOOL_UNKNOWN", should);
     }
     radius_mm = tool->second.radius_mm;
   }
@@ -627,12 +634,7 @@ bool Stopping(Reading& r) {
   return true;
 }
 
-void RefuseUnused(Reading& r) {
-  const std::uint32_t left = r.block.present & ~r.block.used;
-  if (left == 0) {
-    return;
-  }
-  const char letter = static_cast<char>('A' + std::countr_zero(left));
+void RefuseUnused(Reading& r, char letter) {
   switch (letter) {
     case 'U':
     case 'V':
@@ -640,14 +642,19 @@ void RefuseUnused(Reading& r) {
       r.FaultAt(letter, "AXIS_NOT_DRIVEN", "this machine has no axes U, V and W");
       break;
     case 'S':
-    case 'T':
+      r.FaultAt(letter, "WORD_NOT_SUPPORTED", "a jet has no spindle speed");
+      break;
     case 'H':
-      r.FaultAt(letter, "WORD_NOT_SUPPORTED",
-                r.has_spindle() ? "this machine has one tool; G10 L1 and G43 H take its length"
-                                : "a jet has no spindle speed and no tool numbers");
+      r.FaultAt(letter, "WORD_NOT_SUPPORTED", "H, the row of a tool length, stands with G43");
       break;
     default:
       r.FaultAt(letter, "WORD_WITHOUT_USE", "no word of this line takes this one");
+  }
+}
+
+void RefuseUnused(Reading& r) {
+  for (std::uint32_t left = r.block.present & ~r.block.used; left != 0; left &= left - 1) {
+    RefuseUnused(r, static_cast<char>('A' + std::countr_zero(left)));
   }
 }
 
@@ -681,7 +688,7 @@ bool Straight(const Reading& r) {
               : r.block.g_count == 1 && (r.block.g[0].tenfold == 0 || r.block.g[0].tenfold == 10));
 }
 
-void ObeyStraight(Reading& r) {
+bool ObeyStraight(Reading& r) {
   r.codes[kMotion] = kNoCode;
   r.codes[kOnce] = kNoCode;
   r.codes[kFeedMode] = kNoCode;
@@ -691,10 +698,17 @@ void ObeyStraight(Reading& r) {
     r.columns[kMotion] = r.block.g[0].column;
   }
   if (!TakeFeed(r)) {
-    return;
+    return false;
   }
   SettleFeed(r);
-  ObeyMotion(r);
+  return ObeyMotion(r);
+}
+
+bool SettledModes(Reading& r) {
+  if (r.doubt != 0) {
+    SettleModes(r);
+  }
+  return true;
 }
 
 }  // namespace
@@ -723,21 +737,26 @@ void EndProgram(Reading& r) {
   r.ended = true;
 }
 
-void ObeyBlock(Reading& r) {
+int GroupOfCode(char letter, int tenfold) {
+  return letter == 'G' ? ModeGroupOfG(tenfold) : GroupOfM(tenfold);
+}
+
+bool ObeyBlock(Reading& r) {
   if ((r.block.present & ~(LetterBit('X') | LetterBit('Y') | LetterBit('F'))) != 0 && !AxesDriven(r)) {
-    return;
+    return false;
   }
-  if (Straight(r)) {
-    ObeyStraight(r);
-    return;
+  if (r.doubt == 0 && Straight(r)) {
+    return ObeyStraight(r);
   }
-  const bool good = SortCodes(r) && OneTakesEach(r) && KerfAllows(r) && TakeFeed(r) && Outputs(r) && Jet(r) &&
-                    Abrasive(r) && MachineWords(r) && Dwell(r) && Plane(r) && Units(r) && Kerf(r) &&
-                    PathMode(r) && DistanceModes(r) && ChangeOffsets(r) && GoToReference(r) &&
-                    ObeyMotion(r) && Calls(r) && Stopping(r);
+  const bool good = SortCodes(r) && SettledModes(r) && OneTakesEach(r) && KerfAllows(r) && TakeFeed(r) &&
+                    Outputs(r) && ObeyTool(r) && Jet(r) && Abrasive(r) && MachineWords(r) && Dwell(r) &&
+                    Plane(r) && Units(r) && Kerf(r) && PathMode(r) && DistanceModes(r) && ChangeOffsets(r) &&
+                    GoToReference(r) && ObeyMotion(r) && Calls(r) && Stopping(r);
   if (good) {
+    SettleSwitches(r);
     RefuseUnused(r);
   }
+  return good;
 }
 
 }  // namespace lambdajet::trajectory

@@ -5,6 +5,7 @@
 // subprogram (M98, M99). Threads: values. Cost: one look at each line of the program, made at its first O-word or M98.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <map>
 #include <string>
@@ -63,6 +64,10 @@ class FlowTable {
   FlowTable(std::string_view text, std::size_t begin, bool obey_block_delete);
 
   const std::vector<FlowFault>& faults() const { return faults_; }
+  bool numbers_only() const {
+    return std::all_of(lines_.begin(), lines_.end(),
+                       [](const FlowLine& l) { return l.kind == FlowKind::kSubprogram; });
+  }
   const FlowLine& at(std::size_t index) const { return lines_[index]; }
   std::size_t AtLine(std::uint32_t line) const;  // kNowhere if it has no O-word
   std::size_t Sub(const std::string& label) const { return Find(subs_, label); }

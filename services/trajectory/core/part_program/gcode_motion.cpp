@@ -126,6 +126,7 @@ AxisValues Target(Reading& r) {
     const double written = r.block.Take(kAxisLetters[i]) * r.unit(i);
     const double zero = machine ? 0.0 : r.state.absolute ? r.state.zero[i] : r.state.position[i];
     end[i] = zero + written;
+    r.SettlePlace(i);
   }
   return end;
 }
@@ -173,6 +174,9 @@ bool ObeyMotion(Reading& r) {
   }
   if (taken || (!axes && !MovesWithoutAxes(r, s.motion))) {
     return true;
+  }
+  if (word == kNoCode && (r.doubt & kMotionDoubt) != 0) {
+    return false;
   }
   return CoordinatesFinite(r, "XYZABCIJKR") && KerfEnds(r, s.motion) && Obey(r);
 }

@@ -17,7 +17,8 @@ constexpr double kReach = 10.0;
 bool WithinReach(Reading& r, const AxisValues& values) {
   for (const double v : values) {
     if (!(std::abs(v) <= kReach * r.options.largest_coordinate_mm)) {
-      return r.Fault(0, 0, "COORDINATE_TOO_LARGE", "an offset or stored position is at most 1e7 mm");
+      const Group word = r.code(kOnce) != kNoCode ? kOnce : r.code(kOffset) != kNoCode ? kOffset : kLength;
+      return r.FaultAt(word, "COORDINATE_TOO_LARGE", "an offset or stored position is at most 1e7 mm");
     }
   }
   return true;
@@ -165,11 +166,14 @@ bool ToolLength(Reading& r) {
     }
     EachAxisWord(r, [&s](std::size_t i, double written) { s.tool[i] = written; });
   } else {
-    const double h = r.block.has('H') ? r.block.Take('H') : 0.0;
+    const double h = r.block.has('H') ? r.block.Take('H') : s.mounted_tool;
     const auto tool =
         Whole(h, 0.0, kMostTools) ? r.tools.find(static_cast<int>(std::round(h))) : r.tools.end();
     if (tool == r.tools.end()) {
-      return r.FaultAt('H', "TOOL_UNKNOWN", "H0 and H1 are the jet; G10 L1 describes others");
+      const char* should =
+          "H, or the mounted tool, needs a length: G10 L1 describes tools other than 0 and 1";
+      return r.block.has('H') ? r.FaultAt('H', "TOOL_UNKNOWN", should)
+                              : r.FaultAt(kLength, "TOOL_UNKNOWN", should);
     }
     s.tool = tool->second.offset;
   }

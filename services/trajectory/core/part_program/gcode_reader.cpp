@@ -65,14 +65,18 @@ class Reader {
   // What follows a fault is judged only where it does not hang on what the faulty line should have done.
   bool GoOn() const {
     const std::size_t faults = r_.program.faults.size();
-    return faults == 0 || (faults < options_.fault_limit && !flow_ && !parameters_);
+    return faults == 0 || (faults < options_.fault_limit && !branches() && !settings_lost_);
   }
+
+  bool branches() const { return flow_ && !(frames_.empty() && flow_->numbers_only()); }
 
   void NextLine() {
     const char* begin = text_.data() + at_;
     const auto* end = static_cast<const char*>(std::memchr(begin, '\n', text_.size() - at_));
     const std::size_t size = end == nullptr ? text_.size() - at_ : static_cast<std::size_t>(end - begin);
     r_.line = {begin, size};
+    r_.left_in_doubt = 0;
+    r_.moved = false;
     at_ += size + 1;
     ++r_.line_number;
     r_.program.line_count = std::max(r_.program.line_count, r_.line_number);
@@ -82,17 +86,29 @@ class Reader {
   }
 
   void Endless(std::string message) {
-    r_.Fault(0, 0, "PROGRAM_RUNS_TOO_LONG", std::move(message) + "; does a loop never end?");
+    const std::size_t first = std::min(r_.line.find_first_not_of(" \t\r"), r_.line.size());
+    const std::size_t end = std::min(r_.line.find_first_of(" \t\r", first), r_.line.size());
+    r_.Fault(first < end ? static_cast<std::uint32_t>(first + 1) : 0, static_cast<std::uint32_t>(end - first),
+             "PROGRAM_RUNS_TOO_LONG", std::move(message) + "; does a loop never end?");
     r_.ended = true;
   }
 
+  // Behind a fault nobody knows what the parameters of the state hold.
+  bool AsksForState() const {
+    return !r_.program.faults.empty() &&
+           (r_.line.find("#5") != std::string_view::npos || r_.line.find("#<_") != std::string_view::npos);
+  }
+
   void ReadLine() {
-    if (r_.ended) {
+    settings_lost_ = settings_lost_ || AsksForState();
+    if (r_.ended || settings_lost_) {
       return;
     }
     if (r_.line.size() > kLongestLine) {
       r_.Fault(static_cast<std::uint32_t>(kLongestLine + 1), 1, "LINE_TOO_LONG",
                "a line has at most 1000 characters");
+      r_.doubt |= r_.left_in_doubt;
+      settings_lost_ = true;
       return;
     }
     const LineParse parse = ParseLine(r_.line, r_.block, r_.parameters);
@@ -103,6 +119,9 @@ class Reader {
     if (parse.fault.reason != nullptr) {
       r_.parameters.Forget();
       r_.Fault(parse.fault.column, parse.fault.length, parse.fault.reason, parse.fault.message);
+      settings_lost_ = r_.line.find('=') != std::string_view::npos;
+      anything_ = obeyed_ = true;
+      TakeAtItsWords(r_, false);
       return;
     }
     if (parse.percent) {
@@ -124,19 +143,24 @@ class Reader {
 
   void ObeyLine() {
     if (r_.parameters.pending()) {
-      parameters_ = anything_ = true;
+      anything_ = true;
       r_.parameters.Settle();
     }
     if (r_.block.empty()) {
       return;
     }
     anything_ = obeyed_ = true;
-    ObeyBlock(r_);
+    if (!ObeyBlock(r_)) {
+      TakeAtItsWords(r_, true);
+    }
     if (r_.flow.call || r_.flow.leave) {
       const FlowRequest request = std::move(r_.flow);
       r_.flow = {};
       if (r_.program.faults.empty()) {
         request.call ? CallNumbered(request) : LeaveNumbered();
+      } else {
+        r_.doubt |= kEveryDoubt;
+        r_.ended = r_.ended || request.leave;
       }
     }
   }
@@ -152,7 +176,7 @@ class Reader {
   }
 
   void CloseProgram() {
-    if (r_.ended || !r_.program.faults.empty()) {
+    if (r_.ended || !GoOn() || (r_.doubt & kEndDoubt) != 0) {
       return;
     }
     r_.line = {};
@@ -185,7 +209,7 @@ class Reader {
   }
 
   void ObeyFlowLine() {
-    if (!HasFlow()) {
+    if (!HasFlow() || (!r_.program.faults.empty() && branches())) {
       return;
     }
     const std::size_t index = flow_->AtLine(r_.line_number);
@@ -491,8 +515,8 @@ class Reader {
   std::size_t first_ = 0;  // behind a byte order mark
   bool anything_ = false;
   bool percent_ = false;
-  bool obeyed_ = false;      // a block or an O-word
-  bool parameters_ = false;  // some were set
+  bool obeyed_ = false;         // a block or an O-word
+  bool settings_lost_ = false;  // of parameters, in a line that could not be read
   std::size_t lines_obeyed_ = 0;
   std::size_t jumps_ = 0;
 

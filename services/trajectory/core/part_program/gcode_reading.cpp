@@ -47,6 +47,7 @@ Operation& Reading::Add(OperationKind kind) {
 
 Operation& Reading::Move(OperationKind kind, const AxisValues& end) {
   state.position = end;
+  moved = true;
   Operation& o = Add(kind);
   o.kerf_offset_mm = state.kerf_offset_mm;
   return o;
@@ -86,6 +87,10 @@ bool Reading::FaultAtMotion(std::string_view reason, std::string message) {
 
 bool Reading::Fault(std::uint32_t column, std::uint32_t length, std::string_view reason,
                     std::string message) {
+  left_in_doubt |= LeavesInDoubt(reason);
+  if ((RestsOn(reason) & doubt) != 0) {
+    return false;
+  }
   std::string word;
   if (column > 0 && column <= line.size()) {
     word = std::string(line.substr(column - 1, std::min<std::size_t>(length, 60)));

@@ -11,6 +11,7 @@
 #include <string>
 #include <string_view>
 
+#include "trajectory/core/part_program/gcode_doubt.hpp"
 #include "trajectory/core/part_program/gcode_parameters.hpp"
 #include "trajectory/core/part_program/gcode_reader.hpp"
 #include "trajectory/core/part_program/gcode_words.hpp"
@@ -18,6 +19,7 @@
 namespace lambdajet::trajectory {
 
 constexpr double kSecondsPerMinute = 60.0;
+constexpr double kInchMm = 25.4;
 constexpr int kNoCode = -1;
 constexpr int kInputResult = 5399;  // the parameter in which M66 leaves what it saw
 
@@ -42,6 +44,7 @@ enum Group : int {
   kFeedMode,
   kReturnMode,
   kStopping,
+  kTool,
   kJet,
   kAbrasive,
   kOutput,
@@ -87,6 +90,8 @@ struct ModalState {
   bool jet_on = false;
   bool waited_for_input = false;  // since #5399 was set
   bool abrasive_on = false;       // or the coolant, where there is a spindle
+  int selected_tool = -1;         // by T; -1: none yet
+  int mounted_tool = 0;           // 0: none, the jet is the machine's own
   double spindle_per_min = 0.0;   // of S
   double turns_per_min = 0.0;     // as the spindle turns, clockwise positive; 0: it stands
   CycleMemory cycle;
@@ -136,11 +141,19 @@ class Reading : public StateParameters {
   // A motion to there, with the kerf offset that is on.
   Operation& Move(OperationKind kind, const AxisValues& end);
 
+  // Told unless it rests on what is in doubt. False, as the others.
   bool Fault(std::uint32_t column, std::uint32_t length, std::string_view reason, std::string message);
   bool FaultAt(char letter, std::string_view reason, std::string message);
   bool FaultAt(Group group, std::string_view reason, std::string message);
   // At the motion word, or at the first axis word of a line that has none.
   bool FaultAtMotion(std::string_view reason, std::string message);
+
+  // The coordinate of an axis has been written.
+  void SettlePlace(std::size_t axis) {
+    if (doubt != 0 && (doubt & (kUnitsDoubt | kDistanceDoubt)) == 0 && state.absolute) {
+      doubt &= ~(1u << axis);
+    }
+  }
 
   const GcodeOptions& options;
   PartProgram program;
@@ -151,6 +164,9 @@ class Reading : public StateParameters {
   std::string_view line;
   std::uint32_t line_number = 0;
   bool ended = false;
+  Doubt doubt = 0;          // of the state, by faults of lines before
+  Doubt left_in_doubt = 0;  // by faults of this line
+  bool moved = false;       // in this line
   FlowRequest flow;
   std::array<int, kGroupCount> codes{};
   std::array<std::uint32_t, kGroupCount> columns{};
@@ -160,6 +176,7 @@ class Reading : public StateParameters {
 };
 
 std::string ShortNumber(double value);
+int GroupOfCode(char letter, int tenfold);  // kNoCode: no word of this reader
 
 // Each does one part of a block in its turn; false after a fault.
 bool ChangeOffsets(Reading& r);  // G10 G52 G54 … G59.3 G92, G43 G49
@@ -170,9 +187,10 @@ bool ObeySpline(Reading& r, bool cubic);
 bool ObeyCycle(Reading& r);
 void EndProgram(Reading& r);
 void SwitchJetOff(Reading& r);
+bool ObeyTool(Reading& r);     // T M6 M61
 bool ObeySpindle(Reading& r);  // S M3 M4 M5
 void StopSpindle(Reading& r);
-void ObeyBlock(Reading& r);
+bool ObeyBlock(Reading& r);
 
 // Leaves of motion that the parts share.
 bool CoordinatesFinite(Reading& r, std::string_view letters);

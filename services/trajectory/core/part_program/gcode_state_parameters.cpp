@@ -14,7 +14,7 @@ struct Fixed {
   double value;
 };
 // What LinuxCNC programs may ask for and this machine has in one way only.
-constexpr std::array<Fixed, 24> kFixed = {{{"_vmajor", 2.9},
+constexpr std::array<Fixed, 22> kFixed = {{{"_vmajor", 2.9},
                                            {"_vminor", 0.0},
                                            {"_units_per_rev", 0.0},
                                            {"_spindle_rpm_mode", 1.0},
@@ -31,9 +31,7 @@ constexpr std::array<Fixed, 24> kFixed = {{{"_vmajor", 2.9},
                                            {"_abs_u", 0.0},
                                            {"_abs_v", 0.0},
                                            {"_abs_w", 0.0},
-                                           {"_current_tool", 0.0},
                                            {"_current_pocket", 0.0},
-                                           {"_selected_tool", -1.0},
                                            {"_selected_pocket", -1.0},
                                            {"_value", 0.0},
                                            {"_value_returned", 0.0},
@@ -73,6 +71,8 @@ std::optional<double> ModeNamed(const ModalState& state, std::string_view name) 
                          {"_ijk_absolute_mode", state.arc_absolute ? 1.0 : 0.0},
                          {"_spindle_on", state.jet_on || state.turns_per_min != 0.0 ? 1.0 : 0.0},
                          {"_spindle_cw", state.jet_on || state.turns_per_min > 0.0 ? 1.0 : 0.0},
+                         {"_current_tool", state.mounted_tool * 1.0},
+                         {"_selected_tool", state.selected_tool * 1.0},
                          {"_rpm", state.spindle_per_min},
                          {"_mist", state.abrasive_on ? 1.0 : 0.0},
                          {"_flood", state.abrasive_on ? 1.0 : 0.0},
@@ -128,6 +128,13 @@ std::optional<double> Reading::Numbered(int index) const {
       relative[i] = std::abs(relative[i]) < kNearNumber ? 0.0 : relative[i];
     }
     return axis(relative, 5420, true);
+  }
+  if (index == 5400) {
+    return state.mounted_tool;
+  }
+  if (index == 5410) {
+    const auto tool = tools.find(state.mounted_tool);
+    return tool == tools.end() ? 0.0 : 2.0 * tool->second.radius_mm / state.unit_mm;
   }
   return within(5400, 5413) ? std::optional(0.0) : std::nullopt;
 }

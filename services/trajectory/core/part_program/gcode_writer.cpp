@@ -86,6 +86,10 @@ std::string Word(const Operation& o) {
     case OperationKind::kWaitInput:
       return "M66 P" + std::to_string(static_cast<int>(o.condition.input())) + " L" +
              std::to_string(static_cast<int>(o.condition.event())) + " Q" + Number(o.value);
+    case OperationKind::kToolChange:
+      return "T" + Number(o.value) + " M6";
+    case OperationKind::kToolNumber:
+      return "M61 Q" + Number(o.value);
     case OperationKind::kSpindleOn:
       return "S" + Number(std::abs(o.value)) + (o.value > 0.0 ? " M3" : " M4");
     case OperationKind::kSpindleOff:
@@ -128,6 +132,10 @@ void GcodeWriter::Append(const Operation& o) {
       break;  // resolved in the coordinates
     case OperationKind::kFeedChange:
       Feed(o.feed_mm_per_s);
+      break;
+    case OperationKind::kToolChange:
+      Kerf(0.0);  // with which no tool is changed
+      Line(Word(o));
       break;
     default:
       Line(Word(o));

@@ -6,7 +6,7 @@
 namespace lambdajet::trajectory {
 namespace {
 
-constexpr std::array<std::string_view, 25> kNames = {"TRAVERSE",
+constexpr std::array<std::string_view, 27> kNames = {"TRAVERSE",
                                                      "FEED_LINE",
                                                      "FEED_ARC",
                                                      "DWELL",
@@ -30,7 +30,9 @@ constexpr std::array<std::string_view, 25> kNames = {"TRAVERSE",
                                                      "SPINDLE_ON",
                                                      "SPINDLE_OFF",
                                                      "COOLANT_ON",
-                                                     "COOLANT_OFF"};
+                                                     "COOLANT_OFF",
+                                                     "TOOL_CHANGE",
+                                                     "TOOL_NUMBER"};
 
 void Append(std::string& text, const char* key, double value) {
   char number[48];
@@ -82,6 +84,36 @@ void AppendKerf(std::string& text, const Operation& o) {
   }
 }
 
+// Of operations that have no other.
+const char* KeyOf(OperationKind kind) {
+  switch (kind) {
+    case OperationKind::kAbrasiveFlow:
+      return "flow_g_per_min";
+    case OperationKind::kMeasure:
+    case OperationKind::kCameraTrackOn:
+      return "mark";
+    case OperationKind::kToolChange:
+    case OperationKind::kToolNumber:
+      return "tool";
+    case OperationKind::kSpindleOn:
+      return "speed_per_min";
+    case OperationKind::kUnitsChange:
+      return "unit_mm";
+    case OperationKind::kDistanceChange:
+      return "g";
+    case OperationKind::kPathTolerance:
+      return "tolerance_mm";
+    default:
+      return nullptr;
+  }
+}
+
+void AppendOneNumber(std::string& text, const Operation& o) {
+  if (const char* key = KeyOf(o.kind)) {
+    Append(text, key, o.value);
+  }
+}
+
 }  // namespace
 
 std::string_view OperationName(OperationKind kind) { return kNames[static_cast<std::size_t>(kind)]; }
@@ -119,27 +151,8 @@ std::string FormatOperation(const Operation& o) {
       AppendCondition(text, o.condition);
       Append(text, "timeout_s", o.value);
       break;
-    case OperationKind::kAbrasiveFlow:
-      Append(text, "flow_g_per_min", o.value);
-      break;
-    case OperationKind::kMeasure:
-    case OperationKind::kCameraTrackOn:
-      Append(text, "mark", o.value);
-      break;
-    case OperationKind::kSpindleOn:
-      Append(text, "speed_per_min", o.value);
-      break;
-    case OperationKind::kUnitsChange:
-      Append(text, "unit_mm", o.value);
-      break;
-    case OperationKind::kDistanceChange:
-      Append(text, "g", o.value);
-      break;
-    case OperationKind::kPathTolerance:
-      Append(text, "tolerance_mm", o.value);
-      break;
     default:
-      break;
+      AppendOneNumber(text, o);
   }
   return text;
 }

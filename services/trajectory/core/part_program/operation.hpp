@@ -41,6 +41,8 @@ enum class OperationKind : std::uint8_t {
   kSpindleOff,
   kCoolantOn,  // on the fly, of a machine with a spindle
   kCoolantOff,
+  kToolChange,  // M6 with another tool; value: its number. As kStop: until the operator goes on
+  kToolNumber,  // M61; value: the tool that is mounted
 };
 
 // UPPER_SNAKE.

@@ -23,6 +23,9 @@ struct ReadOptions {
       false;  // move the path by the kerf offset that the program asks for (core/toolpath/kerf)
 };
 
+// Gives faults of place, found after reading, the columns of their words; of G-code only.
+void TellWords(std::string_view text, ProgramNotation notation, std::vector<ProgramFault>& faults);
+
 PartProgram ReadPartProgram(std::string_view text, const ReadOptions& options = {});
 
 }  // namespace lambdajet::trajectory

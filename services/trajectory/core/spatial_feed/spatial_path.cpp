@@ -55,6 +55,7 @@ class PathBuilder {
       case OperationKind::kMeasure:
         return StandStill(GateKind::kMeasure, o);
       case OperationKind::kStop:
+      case OperationKind::kToolChange:
         return StandStill(GateKind::kStop, o);
       case OperationKind::kPathTolerance:
         tolerance_mm_ = o.value;
@@ -63,6 +64,7 @@ class PathBuilder {
       case OperationKind::kUnitsChange:
       case OperationKind::kDistanceChange:
       case OperationKind::kWorkOffsetChange:
+      case OperationKind::kToolNumber:
       case OperationKind::kEnd:
         return;
       default:

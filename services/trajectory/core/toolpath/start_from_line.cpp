@@ -35,6 +35,10 @@ void Obey(const Operation& o, ModalState& state) {
     case OperationKind::kCameraTrackOff:
       state.camera_mark_value = -1.0;
       break;
+    case OperationKind::kToolChange:
+    case OperationKind::kToolNumber:
+      state.tool_number_value = o.value;
+      break;
     case OperationKind::kFeedChange:
       state.feed_mm_per_s = o.feed_mm_per_s;
       break;
@@ -76,6 +80,9 @@ class StateWriter {
     }
     if (state_.feed_mm_per_s > 0.0) {
       Add(OperationKind::kFeedChange);
+    }
+    if (state_.tool_number_value >= 0.0) {
+      Add(OperationKind::kToolNumber).value = state_.tool_number_value;
     }
     Add(OperationKind::kTraverse);
     Valves();

@@ -26,6 +26,7 @@ struct ModalState {
   double path_tolerance_mm = -1.0;        // below 0: the program has not said
   double camera_mark_value = -1.0;        // followed; below 0: none
   double abrasive_flow_g_per_min = -1.0;  // below 0: the program has not said
+  double tool_number_value = -1.0;        // mounted; below 0: the program has not said
   bool jet_on = false;
   bool abrasive_on = false;
   bool ended = false;
