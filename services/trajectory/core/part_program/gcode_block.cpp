@@ -147,6 +147,11 @@ const char* AdviceOnG(int tenfold) {
     case 960:
     case 970:
       return "there is no spindle; feed is in units a minute, G94, or inverse time, G93";
+    case 382:
+    case 383:
+    case 384:
+    case 385:
+      return "there is no touch probe; M100 looks at a mark of the sheet";
     case 70:
     case 80:
       return "there is no lathe's diameter mode";

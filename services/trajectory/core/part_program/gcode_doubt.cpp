@@ -48,6 +48,7 @@ constexpr Row kRows[] = {
     {"MOTION_MODE_MISSING", kMotionDoubt, kMotionDoubt},
     {"NOT_WITH_KERF_ON", kKerfDoubt, 0},
     {"OUTPUT_", 0, kJetDoubt},
+    {"PLANE_NOT_DRIVEN", 0, kPlaneDoubt},
     {"ROTATION_", 0, kPlaceDoubt},
     {"SPINDLE_SPEED_MISSING", kSpeedDoubt, kSpeedDoubt},
     {"SPINDLE_SPEED", 0, kSpeedDoubt},
@@ -142,8 +143,7 @@ class Meaning {
         r_.doubt &= ~kMotionDoubt;
         break;
       case kPlane:
-        s_.plane = g == 170 || !r_.drives(2) ? ArcPlane::kXy : g == 180 ? ArcPlane::kZx : ArcPlane::kYz;
-        r_.doubt &= ~kPlaneDoubt;
+        Plane(g);
         break;
       case kUnits:
         s_.unit_mm = g == 200 ? kInchMm : 1.0;
@@ -189,6 +189,13 @@ class Meaning {
       r_.doubt |= kPlaceDoubt;
       taken_ = true;
     }
+  }
+
+  // One that the machine does not have is refused where it is obeyed.
+  void Plane(int g) {
+    const bool driven = g == 170 || r_.drives(2);
+    s_.plane = g == 170 || !driven ? ArcPlane::kXy : g == 180 ? ArcPlane::kZx : ArcPlane::kYz;
+    r_.doubt = driven ? r_.doubt & ~kPlaneDoubt : r_.doubt | kPlaneDoubt;
   }
 
   void Kerf(int g) {
