@@ -140,8 +140,8 @@ CldataReading::Verdict CldataReading::AlongCircle(const Vector& target) {
   if (!DirectionKnown(c, turn)) {
     return Verdict::kFault;
   }
-  if (turn != 0.0) {
-    Sweep(c, target, turn);
+  if (turn != 0.0 && !Sweep(c, target, turn)) {
+    return Verdict::kFault;
   }
   if (c.said_sweep_rad != 0.0) {
     circle_.reset();
@@ -164,7 +164,7 @@ bool CldataReading::DirectionKnown(const CldataCircle& c, double turn) {
 }
 
 // Begins the arc's operation or goes on with it.
-void CldataReading::Sweep(CldataCircle& c, const Vector& target, double turn) {
+bool CldataReading::Sweep(CldataCircle& c, const Vector& target, double turn) {
   if (!c.begun) {
     c.operation = program_.operations.size();
     c.begun = true;
@@ -183,7 +183,7 @@ void CldataReading::Sweep(CldataCircle& c, const Vector& target, double turn) {
   o.center_x_W_mm = settled.center[0];
   o.center_y_W_mm = settled.center[1];
   o.center_z_W_mm = Has(kAxisZ) ? settled.center[2] : 0.0;
-  SetDuration(o, std::hypot(c.radius_mm * o.sweep_rad, target[c.normal] - c.start[c.normal]));
+  return SetPace(o, std::hypot(c.radius_mm * o.sweep_rad, target[c.normal] - c.start[c.normal]));
 }
 
 }  // namespace lambdajet::trajectory

@@ -12,7 +12,6 @@ constexpr double kSecondsPerMinute = 60.0;
 constexpr double kInchMm = 25.4;
 constexpr double kLongestDwell_s = 3600.0;
 constexpr double kLargest_mm = 1e6;
-constexpr double kFastest_mm_per_s = 1e9;
 
 enum class CycleType : std::uint8_t { kPlain, kDeep, kChipBreak };
 
@@ -237,8 +236,11 @@ class CycleWords {
     if (!FeedIn(*feed_unit_, Of(kFeed), units_, feed_mm_per_s, fault_)) {
       return false;
     }
-    return (feed_mm_per_s > 0.0 && feed_mm_per_s < kFastest_mm_per_s) ||
-           Refuse(places_[kFeed], "FEED_NOT_POSITIVE", "the feed must be above 0");
+    if (!(feed_mm_per_s > 0.0)) {
+      return Refuse(places_[kFeed], "FEED_NOT_POSITIVE", "the feed must be above 0");
+    }
+    return feed_mm_per_s <= kFastestFeed_mm_per_s ||
+           Refuse(places_[kFeed], "FEED_OUT_OF_RANGE", "a feed is at most 1e7 mm/s");
   }
 
   const CldataStatement& statement_;

@@ -36,15 +36,16 @@ bool CldataReading::Feedrate() {
     return Fault(At(0).place, "FEED_NOT_A_NUMBER", "a feed is a number and a unit, as in FEDRAT/1200,MMPM");
   }
   const double f = At(number).value;
-  if (!(f > 0.0 && f < 1e9)) {
+  if (!(f > 0.0)) {
     return Fault(At(number).place, "FEED_NOT_POSITIVE", "the feed must be above 0");
   }
-  return has_unit ? FeedIn(At(1 - number), f) : SetFeed(f * unit_mm_ / kSecondsPerMinute);
+  return has_unit ? FeedIn(At(1 - number), At(number))
+                  : SetFeed(At(number), f * unit_mm_ / kSecondsPerMinute);
 }
 
-bool CldataReading::FeedIn(const CldataParameter& unit, double f) {
+bool CldataReading::FeedIn(const CldataParameter& unit, const CldataParameter& number) {
   if (unit.word == "INVERS") {
-    move_s_ = kSecondsPerMinute / f;
+    move_s_ = kSecondsPerMinute / number.value;
     return true;
   }
   if (!IsFeedUnit(unit.word)) {
@@ -53,12 +54,15 @@ bool CldataReading::FeedIn(const CldataParameter& unit, double f) {
   }
   CldataFault fault;
   double feed_mm_per_s = 0.0;
-  return trajectory::FeedIn(unit, f, {unit_mm_, spindle_per_min_}, feed_mm_per_s, fault)
-             ? SetFeed(feed_mm_per_s)
+  return trajectory::FeedIn(unit, number.value, {unit_mm_, spindle_per_min_}, feed_mm_per_s, fault)
+             ? SetFeed(number, feed_mm_per_s)
              : Fault(fault.place, fault.reason, fault.message);
 }
 
-bool CldataReading::SetFeed(double feed_mm_per_s) {
+bool CldataReading::SetFeed(const CldataParameter& number, double feed_mm_per_s) {
+  if (!(feed_mm_per_s <= kFastestFeed_mm_per_s)) {
+    return Fault(number.place, "FEED_OUT_OF_RANGE", "a feed is at most 1e7 mm/s");
+  }
   move_s_ = 0.0;
   if (feed_mm_per_s != feed_mm_per_s_) {
     feed_mm_per_s_ = feed_mm_per_s;

@@ -75,17 +75,18 @@ bool CldataReading::Line(const Vector& target) {
   }
   const double length =
       std::hypot(target[0] - position_[0], target[1] - position_[1], target[2] - position_[2]);
-  Operation& o = Move(OperationKind::kFeedLine, target);
-  SetDuration(o, length);
-  return true;
+  return SetPace(Move(OperationKind::kFeedLine, target), length);
 }
 
 // A time instead of a feed: a feed where there is a way, a duration where there is none.
-void CldataReading::SetDuration(Operation& o, double length_mm) const {
+bool CldataReading::SetPace(Operation& o, double length_mm) {
   if (move_s_ > 0.0) {
     o.feed_mm_per_s = length_mm / move_s_;
     o.value = length_mm > 0.0 ? 0.0 : move_s_;
   }
+  return o.feed_mm_per_s <= kFastestFeed_mm_per_s ||
+         Fault(statement_.place, "FEED_OUT_OF_RANGE",
+               "the time of FEDRAT/INVERS asks for " + Number(o.feed_mm_per_s) + " mm/s here; at most 1e7");
 }
 
 bool CldataReading::HasFeed() {

@@ -59,8 +59,8 @@ class CldataReading {
   // ---- modes: cldata_modes.cpp ----
   bool Units();
   bool Feedrate();
-  bool FeedIn(const CldataParameter& unit, double f);
-  bool SetFeed(double feed_mm_per_s);
+  bool FeedIn(const CldataParameter& unit, const CldataParameter& number);
+  bool SetFeed(const CldataParameter& number, double feed_mm_per_s);
   bool Cutter();
   bool ToolCompensation();
   void SetKerf();
@@ -90,7 +90,7 @@ class CldataReading {
   bool GoDelta();
   bool Traverse(const Vector& target);
   bool Line(const Vector& target);
-  void SetDuration(Operation& o, double length_mm) const;
+  bool SetPace(Operation& o, double length_mm);
   bool HasFeed();
   bool Target(Vector& target);
   bool Coordinate(const CldataParameter& p);
@@ -105,7 +105,7 @@ class CldataReading {
   bool MoveArc();
   Verdict AlongCircle(const Vector& target);
   bool DirectionKnown(const CldataCircle& c, double turn);
-  void Sweep(CldataCircle& c, const Vector& target, double turn);
+  bool Sweep(CldataCircle& c, const Vector& target, double turn);
 
   // ---- holes: cldata_holes.cpp ----
   bool Cycle();

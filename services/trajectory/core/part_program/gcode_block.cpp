@@ -297,6 +297,7 @@ void SettleFeed(Reading& r) {
   }
   s.feed_deg_per_s = s.feed_per_min / kSecondsPerMinute;
   const double feed = s.feed_per_min * s.unit_mm / kSecondsPerMinute;
+  FeedFits(r, feed);
   if (feed != s.feed_mm_per_s) {
     s.feed_mm_per_s = feed;
     r.Add(OperationKind::kFeedChange);

@@ -142,11 +142,18 @@ bool TraverseTo(Reading& r, const AxisValues& end) {
   return true;
 }
 
-void SetPace(const Reading& r, Operation& o, double length_mm, double turned_deg) {
+void FeedFits(Reading& r, double feed_mm_per_s) {
+  if (!(feed_mm_per_s <= kFastestFeed_mm_per_s)) {
+    r.FaultAt('F', "FEED_OUT_OF_RANGE", "a feed is at most 1e7 mm/s");
+  }
+}
+
+void SetPace(Reading& r, Operation& o, double length_mm, double turned_deg) {
   const bool moves = length_mm > kShortest_mm;
   if (r.state.inverse_time) {
     const double duration_s = kSecondsPerMinute / r.state.feed_per_min;
     o.feed_mm_per_s = moves ? length_mm / duration_s : 0.0;
+    FeedFits(r, o.feed_mm_per_s);
     o.value = moves ? 0.0 : duration_s;
   } else if (!moves && turned_deg > 0.0) {
     o.feed_mm_per_s = 0.0;

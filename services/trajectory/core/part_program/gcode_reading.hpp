@@ -195,9 +195,10 @@ bool ObeyBlock(Reading& r);
 // Leaves of motion that the parts share.
 bool CoordinatesFinite(Reading& r, std::string_view letters);
 bool HasFeed(Reading& r);
+void FeedFits(Reading& r, double feed_mm_per_s);  // a fault at F otherwise
 AxisValues Target(Reading& r);
 bool TraverseTo(Reading& r, const AxisValues& end);
 // Sets the feed, or the duration, of a motion of such a length in X, Y, Z.
-void SetPace(const Reading& r, Operation& o, double length_mm, double turned_deg);
+void SetPace(Reading& r, Operation& o, double length_mm, double turned_deg);
 
 }  // namespace lambdajet::trajectory

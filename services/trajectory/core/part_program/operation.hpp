@@ -48,6 +48,9 @@ enum class OperationKind : std::uint8_t {
 // UPPER_SNAKE.
 std::string_view OperationName(OperationKind kind);
 
+// Far beyond every machine; every notation can write what is below it and read it again.
+inline constexpr double kFastestFeed_mm_per_s = 1e7;
+
 // The plane an arc turns in; a helix moves along the plane's normal as it turns.
 enum class ArcPlane : std::uint8_t {
   kXy,  // G17, normal Z
