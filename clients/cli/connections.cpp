@@ -57,7 +57,7 @@ void Connections::AddOptions(CLI::App& app) {
   app.add_option("--services", services_file_, "YAML file of `service: host:port` lines")->group("Services");
   app.add_option("--announce-dir", announce_dir_, "folder of the announce files of running processes")
       ->group("Services");
-  app.add_option("--timeout", timeout_s_, "how long to wait for an answer, s")
+  app.add_option("--timeout-s", timeout_s_, "how long to wait for an answer")
       ->group("Services")
       ->check(CLI::Range(0.01, 86400.0));
   app.add_option("--ca", tls_.ca_file, "PEM to trust the services' certificates; without it plaintext")
@@ -104,14 +104,18 @@ absl::Status Connections::Named(const std::string& service, absl::Status status)
   const std::string reason = TroubleReason(status);
   if (status.code() == absl::StatusCode::kUnavailable && (reason.empty() || reason == "UNAVAILABLE")) {
     const auto address = AddressOf(service);
-    return Trouble(absl::StatusCode::kUnavailable, "SERVICE_UNREACHABLE",
-                   fmt::format("{} at {} does not answer: {}", service, address.value_or("?"),
-                               std::string(status.message())));
+    return Trouble(
+        absl::StatusCode::kUnavailable, "SERVICE_UNREACHABLE",
+        fmt::format(
+            "{0} at {1} does not answer; start it (deploy/demo --keep starts a whole cell), or say where it "
+            "is with --address {0}=HOST:PORT ({2})",
+            service, address.value_or("?"), std::string(status.message())));
   }
   if (status.code() == absl::StatusCode::kDeadlineExceeded &&
       (reason.empty() || reason == "DEADLINE_EXCEEDED")) {
-    return Trouble(absl::StatusCode::kDeadlineExceeded, "TIMEOUT",
-                   fmt::format("{} has not answered in {} s", service, timeout_s_));
+    return Trouble(
+        absl::StatusCode::kDeadlineExceeded, "TIMEOUT",
+        fmt::format("{} has not answered in {} s; --timeout-s gives it longer", service, timeout_s_));
   }
   return status;
 }

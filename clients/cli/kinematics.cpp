@@ -46,12 +46,12 @@ void AddWorkspaceVerb(CLI::App& noun, Output& output) {
   verb->add_option("--mechanism", *mechanism, kMechanismHelp)->check(CLI::IsMember(kMechanisms));
   verb->add_option("--out", planar->out, "CSV; - is standard output");
   verb->add_option("--mode", planar->mode, "lambda: working mode ++, +-, -+ or --; default the machine's");
-  verb->add_option("--tolerance", planar->tolerance_mm, "lambda: of the outline, mm")
+  verb->add_option("--tolerance-mm", planar->tolerance_mm, "lambda: of the outline")
       ->check(CLI::Range(0.001, 100.0));
-  verb->add_option("--z", spatial->z_mm, "hexapod: heights of the slices, mm");
-  verb->add_option("--tilt", spatial->tilt_rad,
-                   "hexapod: tilts about x that must all be served, both ways, rad");
-  verb->add_option("--step", spatial->step_mm, "hexapod: grid of the slices, mm");
+  verb->add_option("--z-mm", spatial->z_mm, "hexapod: heights of the slices");
+  verb->add_option("--tilt-rad", spatial->tilt_rad,
+                   "hexapod: tilts about x that must all be served, both ways");
+  verb->add_option("--step-mm", spatial->step_mm, "hexapod: grid of the slices");
   verb->callback([planar, spatial, mechanism, &output] {
     spatial->machine = planar->machine;
     spatial->out = planar->out;

@@ -193,7 +193,7 @@ absl::Status TabulateServiceArea(const ServiceAreaOptions& options, Output& outp
     }
     AddServiceRow(at, value, table);
   }
-  return DeliverTable(table, options.out, fmt::format("{} rows", points), output);
+  return DeliverTable(table, options.out, fmt::format("{} {}", points, points == 1 ? "row" : "rows"), output);
 }
 
 }  // namespace

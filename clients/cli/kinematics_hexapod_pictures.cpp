@@ -7,6 +7,7 @@
 
 #include "clients/cli/kinematics_hexapod.hpp"
 #include "clients/cli/picture.hpp"
+#include "clients/cli/picture_option.hpp"
 #include "foundation/contract/trouble.hpp"
 #include "kinematics/core/hexapod_singularity.hpp"
 #include "kinematics/core/service_rectangle.hpp"
@@ -437,9 +438,9 @@ void AddHexapodPictures(CLI::App& draw, Output& output) {
   mechanism
       ->add_option("--pose", hexapod->pose, "tool: x_mm y_mm z_mm psi_rad theta_rad gamma_rad; default home")
       ->expected(6);
-  mechanism->add_option("--tilt", hexapod->tilt_rad,
-                        "tilts about x that the slice must serve, both ways, rad");
-  mechanism->add_option("--out", hexapod->out, "picture, .svg or .png")->required();
+  mechanism->add_option("--tilt-rad", hexapod->tilt_rad,
+                        "tilts about x that the slice must serve, both ways");
+  AddPictureOption(*mechanism, "--out", hexapod->out, "of the hexapod")->required();
   mechanism->callback([hexapod, &output] { output.Finish(DrawHexapod(*hexapod)); });
 
   auto settings = std::make_shared<std::vector<std::string>>();
@@ -447,12 +448,12 @@ void AddHexapodPictures(CLI::App& draw, Output& output) {
   CLI::App* area =
       draw.add_subcommand("service-area", "the paper's Fig. 2 with its parts, beside what is really served");
   area->add_option("--set", *settings, "name=number, as in service-area");
-  area->add_option("--out", *out, "picture, .svg or .png")->required();
+  AddPictureOption(*area, "--out", *out, "of the areas")->required();
   area->callback([settings, out, &output] { output.Finish(DrawServiceArea(*settings, *out)); });
 
   auto sweeps_out = std::make_shared<std::string>();
   CLI::App* sweeps = draw.add_subcommand("sweeps", "the paper's Figs 3 to 8");
-  sweeps->add_option("--out", *sweeps_out, "picture, .svg or .png")->required();
+  AddPictureOption(*sweeps, "--out", *sweeps_out, "of the sweeps")->required();
   sweeps->callback([sweeps_out, &output] { output.Finish(DrawSweeps(*sweeps_out)); });
 }
 

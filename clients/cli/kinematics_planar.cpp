@@ -222,7 +222,7 @@ struct OptimiseOptions {
 
 absl::StatusOr<Rectangle> ZoneOf(const std::vector<double>& zone_mm) {
   if (zone_mm.size() != 4 || !(zone_mm[2] > zone_mm[0]) || !(zone_mm[3] > zone_mm[1])) {
-    return Wrong("BAD_ZONE", "--zone takes x_min y_min x_max y_max in mm, the maxima above the minima");
+    return Wrong("BAD_ZONE", "--zone-mm takes x_min y_min x_max y_max, the maxima above the minima");
   }
   return Rectangle{zone_mm[0], zone_mm[1], zone_mm[2], zone_mm[3]};
 }
@@ -419,7 +419,7 @@ void AddOptimiseVerb(CLI::App& noun, Output& output) {
   auto options = std::make_shared<OptimiseOptions>();
   CLI::App* verb = noun.add_subcommand("optimise", "link lengths and rail offset for a wanted zone");
   verb->add_option("--machine", options->machine, "machine file to start from")->required();
-  verb->add_option("--zone", options->zone_mm, "x_min y_min x_max y_max in D, mm")->required()->expected(4);
+  verb->add_option("--zone-mm", options->zone_mm, "x_min y_min x_max y_max in D")->required()->expected(4);
   verb->add_option("--objective", options->objective,
                    "gain: least worst error gain; rectangle: largest usable rectangle")
       ->check(CLI::IsMember({"gain", "rectangle"}));
@@ -437,11 +437,11 @@ void AddSweepVerb(CLI::App& noun, Output& output) {
   CLI::App* verb = noun.add_subcommand("sweep", "whether the sheet meets a fixed body on its way");
   verb->add_option("--machine", options->machine, "machine file")->required();
   verb->add_option("--in", options->in, "CSV with x_D_mm, y_D_mm: the tool's path; - is standard input");
-  verb->add_option("--body", options->bodies_mm, "x_min y_min x_max y_max in D, mm; may be given again")
+  verb->add_option("--body-mm", options->bodies_mm, "x_min y_min x_max y_max in D; may be given again")
       ->required()
       ->expected(4)
       ->take_all();
-  verb->add_option("--margin", options->margin_mm, "distance that counts as contact, mm")
+  verb->add_option("--margin-mm", options->margin_mm, "distance that counts as contact")
       ->check(CLI::NonNegativeNumber);
   verb->callback([options, &output] { output.Finish(Sweep(*options, output)); });
 }

@@ -8,6 +8,7 @@
 
 #include "clients/cli/kinematics_planar.hpp"
 #include "clients/cli/picture.hpp"
+#include "clients/cli/picture_option.hpp"
 #include "foundation/contract/trouble.hpp"
 #include "kinematics/core/lambda_kernel.hpp"
 #include "kinematics/core/workspace.hpp"
@@ -276,10 +277,10 @@ std::shared_ptr<PictureOptions> AddPicture(CLI::App& draw, Output& output, const
   auto options = std::make_shared<PictureOptions>();
   CLI::App* verb = draw.add_subcommand(name, what);
   verb->add_option("--machine", options->machine, "machine file")->required();
-  verb->add_option("--out", options->out, "picture; .svg or .png")->required();
+  AddPictureOption(*verb, "--out", options->out, "of the mechanism")->required();
   verb->add_option("--mode", options->mode, "working mode: ++, +-, -+ or --; default the machine's");
   if (picture == DrawPose) {
-    verb->add_option("--at", options->at_mm, "x_D y_D of the tool, mm")->required()->expected(2);
+    verb->add_option("--at-mm", options->at_mm, "x_D y_D of the tool")->required()->expected(2);
   }
   verb->callback([options, picture, &output] { output.Finish(picture(*options, output)); });
   return options;

@@ -70,9 +70,22 @@ std::string_view CodeName(ExitCode code) {
   return "FAILED";
 }
 
+// What is wrong with a word of the command line or with a file that it names, whatever it is wanted for.
+bool NamesWrongWordOrFile(std::string_view reason) {
+  static constexpr std::array<std::string_view, 16> kReasons = {
+      "FILE_NOT_READ", "FILE_TOO_LARGE",    "NO_SUCH_FILE",     "NOT_A_FILE",        "YAML_SYNTAX",
+      "YAML_VALUE",    "BAD_MACHINE_FILE",  "BAD_HEXAPOD_FILE", "BAD_DRAWING",       "BAD_ADDRESS",
+      "BAD_MODE",      "BAD_SERVICES_FILE", "BAD_ZONE",         "BAD_ANNOUNCE_FILE", "DRAWING_NOT_PROGRAM",
+      "PICTURE_SUFFIX"};
+  return reason.starts_with("CSV_") || std::ranges::find(kReasons, reason) != kReasons.end();
+}
+
 }  // namespace
 
 ExitCode ExitCodeOf(const absl::Status& status) {
+  if (NamesWrongWordOrFile(TroubleReason(status))) {
+    return ExitCode::kUsage;
+  }
   switch (status.code()) {
     case absl::StatusCode::kOk:
       return ExitCode::kOk;

@@ -1,5 +1,6 @@
 #include "clients/cli/program_faults.hpp"
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 namespace lambdajet::cli {
@@ -20,6 +21,11 @@ void TellFaults(const std::string& file, const std::vector<trajectory::ProgramFa
                     {"message", fault.message}});
   }
   output.Json({{"faults", list}});
+  if (std::ranges::any_of(faults, [](const auto& fault) { return fault.reason == "AXIS_NOT_DRIVEN"; })) {
+    output.Message(
+        "a hexapod's program is read with --axes hexapod, and checked, planned and drawn with --hexapod "
+        "FILE");
+  }
   output.Exit(ExitCode::kRefused);
 }
 

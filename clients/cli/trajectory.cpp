@@ -3,8 +3,11 @@
 #include <string>
 
 #include "clients/cli/csv.hpp"
+#include "clients/cli/picture.hpp"
+#include "clients/cli/picture_option.hpp"
 #include "clients/cli/plan_feed.hpp"
 #include "clients/cli/program_faults.hpp"
+#include "clients/cli/program_file.hpp"
 #include "clients/cli/text_file.hpp"
 #include "clients/cli/tolerance_option.hpp"
 #include "clients/cli/trajectory_pictures.hpp"
@@ -31,6 +34,7 @@ struct ProgramVerb {
   std::string machine = "deploy/config/machine.yaml";
   std::string hexapod;  // set: its file instead of the machine's
   std::string out;
+  std::string picture;
   std::string colour = "speed";
   double step_s = kDefaultStep_s;
   double rate_hz = 10000.0;
@@ -44,15 +48,14 @@ struct ProgramVerb {
 };
 
 absl::Status Canon(const ProgramVerb& verb, Output& output) {
-  const auto text = ReadTextFile(verb.program);
+  const auto text = ReadProgramFile(verb.program);
   if (!text.ok()) {
     return text.status();
   }
   trajectory::ReadOptions reading;
   reading.gcode = verb.reading;
-  reading.gcode.axes = reading.cldata.axes =
-      verb.axes == "xy" ? trajectory::kPlanarAxes : trajectory::kSixAxes;
-  reading.cldata.tool_angles = trajectory::ToolAngles::kRollPitch;
+  reading.gcode.axes = reading.cldata.axes = AxesOf(verb.axes);
+  reading.cldata.tool_angles = ToolAnglesOf(verb.axes);
   if (reading.gcode.kerf_width_mm <= 0.0) {  // not told: the machine's, as it would be cut
     const auto machine = ReadMachineFile(verb.machine);
     reading.gcode.kerf_width_mm = machine.ok() ? machine->process.kerf_width_mm : 0.0;
@@ -87,15 +90,16 @@ absl::Status Canon(const ProgramVerb& verb, Output& output) {
 }
 
 SpatialVerb SpatialOf(const ProgramVerb& verb) {
-  return {verb.program, verb.hexapod, verb.out, verb.colour, verb.step_s, verb.options.feed_scale,
-          verb.rate_hz};
+  return {
+      verb.program, verb.hexapod, verb.out, verb.picture, verb.colour, verb.step_s, verb.options.feed_scale,
+      verb.rate_hz};
 }
 
 absl::Status Check(const ProgramVerb& verb, Output& output) {
   if (!verb.hexapod.empty()) {
     return CheckSpatial(SpatialOf(verb), output);
   }
-  const auto text = ReadTextFile(verb.program);
+  const auto text = ReadProgramFile(verb.program);
   const auto machine = ReadMachineFile(verb.machine);
   if (!text.ok() || !machine.ok()) {
     return text.ok() ? machine.status() : text.status();
@@ -133,7 +137,7 @@ void AddWishes(const ProgramVerb& verb, PlanOptions& options) {
 // The plan, or nothing after its faults were told.
 absl::StatusOr<trajectory::TolerancePlan> PlanFile(const ProgramVerb& verb, Output& output,
                                                    MachineDescription& machine) {
-  const auto text = ReadTextFile(verb.program);
+  const auto text = ReadProgramFile(verb.program);
   const auto read = ReadMachineFile(verb.machine);
   if (!text.ok() || !read.ok()) {
     return text.ok() ? read.status() : text.status();
@@ -274,14 +278,14 @@ absl::Status DrawVerb(const ProgramVerb& verb, Output& output) {
     TellFaults(verb.program, answer->planned.faults, output);
     return absl::OkStatus();
   }
-  return DrawPlan(answer->planned, machine, verb.colour, verb.out);
+  return DrawPlan(answer->planned, machine, verb.colour, verb.picture);
 }
 
 CLI::App* AddProgramVerb(CLI::App& noun, Output& output, const char* name, const char* what,
                          const std::shared_ptr<ProgramVerb>& verb,
                          absl::Status (*work)(const ProgramVerb&, Output&)) {
   CLI::App* app = noun.add_subcommand(name, what);
-  app->add_option("program", verb->program, "G-code or CLDATA file; - is standard input")->required();
+  app->add_option("FILE", verb->program, "G-code or CLDATA file; - is standard input")->required();
   app->callback([verb, work, &output] {
     if (const absl::Status status = work(*verb, output);
         !status.ok()) {  // faults have set their own exit code
@@ -301,6 +305,11 @@ void AddMachineOptions(CLI::App& app, const std::shared_ptr<ProgramVerb>& verb) 
       ->excludes("--machine");
 }
 
+void AddFeedScale(CLI::App& app, const std::shared_ptr<ProgramVerb>& verb) {
+  app.add_option("--feed-scale", verb->options.feed_scale, "factor on programmed feeds, above 0 to 1.2")
+      ->check(CLI::Range(1e-6, 1.2));
+}
+
 void AddPlanOptions(CLI::App& app, const std::shared_ptr<ProgramVerb>& verb) {
   AddMachineOptions(app, verb);
   app.add_flag("--compensate", verb->options.compensate, "elastic feed-forward");
@@ -311,7 +320,7 @@ void AddPlanOptions(CLI::App& app, const std::shared_ptr<ProgramVerb>& verb) {
       ->check(ToleranceWordFault);
   app.add_option("--tolerance-contour", verb->tolerance_contours, "the same for the n-th cut, as 2=0.05")
       ->check(ToleranceWordFault);
-  app.add_option("--feed-scale", verb->options.feed_scale, "factor on programmed feeds, above 0 to 1.2");
+  AddFeedScale(app, verb);
   app.add_option("--start-from-s-mm", verb->start_from_s_mm, "resume: path length already cut");
   app.add_option("--overlap-mm", verb->options.overlap_mm, "resume: backed up by this");
 }
@@ -322,9 +331,7 @@ void AddTrajectoryVerbs(CLI::App& noun, Output& output) {
   const auto canon = std::make_shared<ProgramVerb>();
   CLI::App* canon_app =
       AddProgramVerb(noun, output, "canon", "the program's canonical operations, one a line", canon, Canon);
-  canon_app->add_option("--axes", canon->axes, "of the machine the program is read for")
-      ->check(CLI::IsMember({"xy", "xyzabc"}))
-      ->capture_default_str();
+  AddAxesOption(*canon_app, canon->axes);
   canon_app->add_flag("--leave-out-z", canon->reading.leave_out_z,
                       "with xy: Z words of a flat program are read over, not refused");
   canon_app->add_option("--kerf-width-mm", canon->reading.kerf_width_mm,
@@ -340,12 +347,11 @@ void AddTrajectoryVerbs(CLI::App& noun, Output& output) {
       noun, output, "play", "plays a hexapod's plan through its kinematics: error of the tip, limits, time",
       play, [](const ProgramVerb& verb, Output& to) { return PlaySpatial(SpatialOf(verb), to); });
   play_app->add_option("--hexapod", play->hexapod, "YAML file of the hexapod")->capture_default_str();
-  play_app->add_option("--feed-scale", play->options.feed_scale,
-                       "factor on programmed feeds, above 0 to 1.2");
+  AddFeedScale(*play_app, play);
   play_app->add_option("--rate-hz", play->rate_hz, "cycles a second")
       ->check(CLI::Range(100.0, 100000.0))
       ->capture_default_str();
-  play_app->add_option("--draw", play->out, "picture of path, struts and errors, .svg or .png");
+  AddPictureOption(*play_app, "--picture", play->picture, "of path, struts and errors");
   const auto plan = std::make_shared<ProgramVerb>();
   CLI::App* plan_app =
       AddProgramVerb(noun, output, "plan",
@@ -357,7 +363,7 @@ void AddTrajectoryVerbs(CLI::App& noun, Output& output) {
   CLI::App* draw_app =
       AddProgramVerb(noun, output, "draw", "toolpath and profiles over time as SVG or PNG", draw, DrawVerb);
   AddPlanOptions(*draw_app, draw);
-  draw_app->add_option("--out", draw->out, "picture, .svg or .png")->required();
+  AddPictureOption(*draw_app, "--out", draw->picture, "of the plan")->required();
   draw_app->add_option("--colour", draw->colour, "what the path's colour says")
       ->check(CLI::IsMember({"speed", "limit", "error"}))
       ->capture_default_str();

@@ -8,8 +8,10 @@
 #include <numbers>
 #include <string>
 
+#include "clients/cli/picture_option.hpp"
 #include "clients/cli/pilger_die_file.hpp"
 #include "clients/cli/program_faults.hpp"
+#include "clients/cli/program_file.hpp"
 #include "clients/cli/text_file.hpp"
 #include "clients/cli/trajectory_cldata_pictures.hpp"
 #include "clients/cli/verbs.hpp"
@@ -25,26 +27,21 @@ using trajectory::VerifyArgument;
 
 constexpr double kDegPerRad = 180.0 / std::numbers::pi;
 constexpr std::size_t kMostBreaksTold = 20;
+constexpr char kProgramFile[] = "G-code or CLDATA file; - is standard input";
 
 struct CldataVerb {
   std::string file;
   std::string out;
-  std::string draw;
+  std::string picture;
   std::string argument = "auto";
-  bool six_axes = false;
-  bool hexapod = false;
+  std::string axes = "xy";
 };
 
-trajectory::ToolAngles ToolAnglesOf(bool hexapod) {
-  return hexapod ? trajectory::ToolAngles::kRollPitch : trajectory::ToolAngles::kRotaryHead;
-}
-
 // A program that tilts its tool is read for six axes; whether a machine can cut it is asked by `check`.
-trajectory::PartProgram ReadAnyProgram(const std::string& text, bool six_axes, bool hexapod = false) {
+trajectory::PartProgram ReadAnyProgram(const std::string& text, const std::string& axes) {
   trajectory::ReadOptions options;
-  options.cldata.axes = options.gcode.axes =
-      six_axes || hexapod ? trajectory::kSixAxes : trajectory::kPlanarAxes;
-  options.cldata.tool_angles = ToolAnglesOf(hexapod);
+  options.cldata.axes = options.gcode.axes = AxesOf(axes);
+  options.cldata.tool_angles = ToolAnglesOf(axes);
   trajectory::PartProgram program = ReadPartProgram(text, options);
   const auto needs_axes = [](const trajectory::ProgramFault& f) { return f.reason == "AXIS_NOT_DRIVEN"; };
   if (std::any_of(program.faults.begin(), program.faults.end(), needs_axes)) {
@@ -55,23 +52,23 @@ trajectory::PartProgram ReadAnyProgram(const std::string& text, bool six_axes, b
 }
 
 absl::Status WriteAsCldata(const CldataVerb& verb, Output& output) {
-  const auto text = ReadTextFile(verb.file);
+  const auto text = ReadProgramFile(verb.file);
   if (!text.ok()) {
     return text.status();
   }
-  const trajectory::PartProgram program = ReadAnyProgram(*text, verb.six_axes, verb.hexapod);
+  const trajectory::PartProgram program = ReadAnyProgram(*text, verb.axes);
   if (!program.faults.empty()) {
     TellFaults(verb.file, program.faults, output);
     return absl::OkStatus();
   }
   const std::size_t name = verb.file.find_last_of('/') + 1;
   const trajectory::CldataText cldata =
-      WriteCldata(program.operations, verb.file.substr(name), {}, ToolAnglesOf(verb.hexapod));
+      WriteCldata(program.operations, verb.file.substr(name), {}, ToolAnglesOf(verb.axes));
   if (!cldata.faults.empty()) {
     TellFaults(verb.file, cldata.faults, output);
     return absl::OkStatus();
   }
-  return WriteTextFile(verb.out.empty() ? "-" : verb.out, cldata.text);
+  return WriteTextFile(verb.out, cldata.text);
 }
 
 std::string BreakName(int order) {
@@ -129,22 +126,12 @@ void TellVerification(const ProgramVerification& v, Output& output) {
   output.Table(table);
 }
 
-// The picture as asked for, and, where its suffix is .svg or .png, the other of the two beside it.
-absl::Status DrawBoth(const std::string& path, const auto& draw) {
-  absl::Status status = draw(path);
-  const std::string stem = path.size() > 4 ? path.substr(0, path.size() - 4) : path;
-  if (status.ok() && (path.ends_with(".svg") || path.ends_with(".png"))) {
-    status = draw(stem + (path.ends_with(".svg") ? ".png" : ".svg"));
-  }
-  return status;
-}
-
 absl::Status Verify(const CldataVerb& verb, Output& output) {
-  const auto text = ReadTextFile(verb.file);
+  const auto text = ReadProgramFile(verb.file);
   if (!text.ok()) {
     return text.status();
   }
-  const trajectory::PartProgram program = ReadAnyProgram(*text, verb.six_axes, verb.hexapod);
+  const trajectory::PartProgram program = ReadAnyProgram(*text, verb.axes);
   if (!program.faults.empty()) {
     TellFaults(verb.file, program.faults, output);
     return absl::OkStatus();
@@ -155,9 +142,7 @@ absl::Status Verify(const CldataVerb& verb, Output& output) {
   const ProgramVerification verification = VerifyProgram(program.operations, argument);
   TellVerification(verification, output);
   output.Json(VerificationJson(verification));
-  return verb.draw.empty() ? absl::OkStatus() : DrawBoth(verb.draw, [&](const std::string& path) {
-    return DrawVerification(verification, path);
-  });
+  return verb.picture.empty() ? absl::OkStatus() : DrawVerification(verification, verb.picture);
 }
 
 // How often each law was chosen for each coordinate, its highest peak, and how far that is from the bound.
@@ -240,7 +225,7 @@ absl::Status Pilger(const CldataVerb& verb, Output& output) {
        std::to_string(program.passes.size()) + " PASSES, WHEEL " + Shortest(file->die.wheel.radius_mm) +
            " MM, PROFILE " + Shortest(file->die.wheel.profile_radius_mm) + " MM"});
   // What is verified is what was written.
-  const trajectory::PartProgram written = ReadAnyProgram(cldata.text, true);
+  const trajectory::PartProgram written = ReadAnyProgram(cldata.text, "rotary-head");
   if (!cldata.faults.empty() || !written.faults.empty()) {
     TellFaults(verb.file, cldata.faults.empty() ? written.faults : cldata.faults, output);
     return absl::OkStatus();
@@ -256,17 +241,16 @@ absl::Status Pilger(const CldataVerb& verb, Output& output) {
   TellVerification(verification, output);
   output.Json(PilgerJson(program, verification));
   absl::Status status = verb.out.empty() ? absl::OkStatus() : WriteTextFile(verb.out, cldata.text);
-  if (status.ok() && !verb.draw.empty()) {
-    status =
-        DrawBoth(verb.draw, [&](const std::string& path) { return DrawPilger(program, file->die, path); });
+  if (status.ok() && !verb.picture.empty()) {
+    status = DrawPilger(program, file->die, verb.picture);
   }
   return status;
 }
 
-CLI::App* AddVerb(CLI::App& noun, Output& output, const char* name, const char* what,
+CLI::App* AddVerb(CLI::App& noun, Output& output, const char* name, const char* what, const char* file,
                   const std::shared_ptr<CldataVerb>& verb, absl::Status (*work)(const CldataVerb&, Output&)) {
   CLI::App* app = noun.add_subcommand(name, what);
-  app->add_option("file", verb->file, "part program, or die for pilger; - is standard input")->required();
+  app->add_option("FILE", verb->file, file)->required();
   app->callback([verb, work, &output] {
     if (const absl::Status status = work(*verb, output);
         !status.ok()) {  // faults have set their own exit code
@@ -280,27 +264,26 @@ CLI::App* AddVerb(CLI::App& noun, Output& output, const char* name, const char* 
 
 void AddCldataVerbs(CLI::App& noun, Output& output) {
   const auto convert = std::make_shared<CldataVerb>();
-  CLI::App* cldata =
-      AddVerb(noun, output, "cldata", "a program in any notation, written as CLDATA", convert, WriteAsCldata);
-  cldata->add_option("--out", convert->out, "CLDATA file; default standard output");
-  cldata->add_flag("--six-axes", convert->six_axes, "read for a machine with Z and a tilting tool");
-  cldata->add_flag("--hexapod", convert->hexapod, "the same, A and B a hexapod's roll and pitch");
+  convert->out = "-";
+  CLI::App* cldata = AddVerb(noun, output, "cldata", "a program in any notation, written as CLDATA",
+                             kProgramFile, convert, WriteAsCldata);
+  cldata->add_option("--out", convert->out, "CLDATA file; - is standard output");
+  AddAxesOption(*cldata, convert->axes);
   const auto verified = std::make_shared<CldataVerb>();
-  CLI::App* verify =
-      AddVerb(noun, output, "verify",
-              "position and both derivatives of every coordinate, and where they break", verified, Verify);
-  verify->add_option("--draw", verified->draw, "picture; .svg and .png are both written");
+  CLI::App* verify = AddVerb(noun, output, "verify",
+                             "position and both derivatives of every coordinate, and where they break",
+                             kProgramFile, verified, Verify);
+  AddPictureOption(*verify, "--picture", verified->picture, "of every coordinate with both derivatives");
   verify->add_option("--argument", verified->argument, "what the coordinates are drawn over")
       ->check(CLI::IsMember({"auto", "path", "turn"}))
       ->capture_default_str();
-  verify->add_flag("--six-axes", verified->six_axes, "read for a machine with Z and a tilting tool");
-  verify->add_flag("--hexapod", verified->hexapod, "the same, A and B a hexapod's roll and pitch");
+  AddAxesOption(*verify, verified->axes);
   const auto made = std::make_shared<CldataVerb>();
   CLI::App* pilger =
-      AddVerb(noun, output, "pilger", "the four-axis grinding program of a pilger die", made, Pilger);
+      AddVerb(noun, output, "pilger", "the four-axis grinding program of a pilger die",
+              "YAML of the die, as deploy/parts/pilger_die/die.yaml; - is standard input", made, Pilger);
   pilger->add_option("--out", made->out, "CLDATA file");
-  pilger->add_option("--draw", made->draw,
-                     "picture of groove, passes and axes; .svg and .png are both written");
+  AddPictureOption(*pilger, "--picture", made->picture, "of groove, passes and axes");
 }
 
 }  // namespace lambdajet::cli

@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "clients/cli/picture_option.hpp"
+#include "clients/cli/program_file.hpp"
 #include "clients/cli/text_file.hpp"
 #include "clients/cli/trajectory_drawing_picture.hpp"
 #include "clients/cli/verbs.hpp"
@@ -180,7 +182,7 @@ void AddContourOptions(CLI::App& app, ToolpathVerb& verb) {
   app.add_option("--mark", verb.contours.mark_layers, "layer to scribe along its lines, may be given again");
   app.add_option("--ignore-type", verb.contours.ignore_types,
                  "entity type to leave out (TEXT, …), may be given again");
-  app.add_option("--at", verb.at_mm, "X Y in W of the drawing's lower left corner, mm; none: as drawn")
+  app.add_option("--at-mm", verb.at_mm, "X Y in W of the drawing's lower left corner; none: as drawn")
       ->expected(2);
   app.add_option("--turn-deg", verb.turn_deg, "turns the drawing counter-clockwise");
 }
@@ -195,7 +197,7 @@ void AddCutOptions(CLI::App& app, ToolpathVerb& verb) {
   app.add_option("--kerf-mm", t.kerf_mm, "width of the cut")
       ->check(CLI::Range(0.0, 10.0))
       ->capture_default_str();
-  app.add_option("--feed-mm-per-s", t.feed_mm_per_s, "of the cut")
+  app.add_option("--cut-feed-mm-per-s", t.feed_mm_per_s, "of the cut")
       ->check(CLI::Range(0.01, 2000.0))
       ->capture_default_str();
   app.add_option("--lead", t.lead, "none, line or arc")->transform(CLI::CheckedTransformer(kLeads));
@@ -205,7 +207,7 @@ void AddCutOptions(CLI::App& app, ToolpathVerb& verb) {
   app.add_option("--lead-angle-deg", verb.lead_angle_deg, "of a line to the path")
       ->check(CLI::Range(5.0, 90.0))
       ->capture_default_str();
-  app.add_option("--overlap-mm", t.overlap_mm, "cut again where the path closes")
+  app.add_option("--lead-overlap-mm", t.overlap_mm, "cut again where the path closes")
       ->check(CLI::Range(0.0, 50.0))
       ->capture_default_str();
   app.add_option("--pierce", t.pierce, "stationary, moving or pre-pierced")
@@ -235,7 +237,7 @@ struct LineVerb {
 };
 
 absl::Status TellLineStart(const LineVerb& verb, Output& output) {
-  const auto text = ReadTextFile(verb.program);
+  const auto text = ReadProgramFile(verb.program);
   if (!text.ok()) {
     return text.status();
   }
@@ -282,9 +284,9 @@ void AddDrawingVerbs(CLI::App& noun, Output& output) {
   const auto verb = std::make_shared<ToolpathVerb>();
   CLI::App* app = noun.add_subcommand(
       "toolpath", "a part program from a DXF drawing: kerf, leads, order; exit code 4 if it cannot be cut");
-  app->add_option("drawing", verb->drawing, "DXF file; - is standard input")->required();
+  app->add_option("FILE", verb->drawing, "DXF file; - is standard input")->required();
   app->add_option("--out", verb->out, "part program; - is standard output");
-  app->add_option("--picture", verb->picture, "drawing and toolpath, .svg or .png");
+  AddPictureOption(*app, "--picture", verb->picture, "of drawing and toolpath");
   app->add_option("--reference", verb->reference, "YAML of the finished geometry, for inspection");
   app->add_option("--reference-tolerance-mm", verb->reference_tolerance_mm, "in it")
       ->check(CLI::Range(1e-4, 10.0));
@@ -298,8 +300,8 @@ void AddDrawingVerbs(CLI::App& noun, Output& output) {
   const auto line = std::make_shared<LineVerb>();
   CLI::App* from =
       noun.add_subcommand("from-line", "the modal state at a line, and the operations from there on");
-  from->add_option("program", line->program, "G-code file; - is standard input")->required();
-  from->add_option("line", line->line, "first line that is obeyed")->required();
+  from->add_option("FILE", line->program, "G-code file; - is standard input")->required();
+  from->add_option("LINE", line->line, "first line that is obeyed")->required();
   from->add_option("--out", line->out, "a program of its own that begins there; - is standard output");
   from->callback([line, &output] { output.Finish(TellLineStart(*line, output)); });
 }

@@ -546,7 +546,7 @@ void AddFormatOptions(CLI::App& verb, FormatOptions& options) {
                                                               : Settings::PIERCE_STATIONARY);
                           })
       ->check(CLI::IsMember({"stationary", "moving", "pre-pierced"}));
-  AddSetting<std::vector<double>>(verb, options, "--at", "X Y in W of the drawing's lower left corner, mm",
+  AddSetting<std::vector<double>>(verb, options, "--at-mm", "X Y in W of the drawing's lower left corner",
                                   [](Settings& s, const std::vector<double>& v) {
                                     s.set_corner_x_w_mm(v[0]);
                                     s.set_corner_y_w_mm(v[1]);

@@ -12,7 +12,7 @@
 #include "clients/cli/picture.hpp"
 #include "clients/cli/plan_feed.hpp"
 #include "clients/cli/program_faults.hpp"
-#include "clients/cli/text_file.hpp"
+#include "clients/cli/program_file.hpp"
 #include "platform/machine_file/hexapod_file.hpp"
 #include "trajectory/core/spatial_feed/play_spatial_plan.hpp"
 
@@ -37,7 +37,7 @@ struct SpatialFiles {
 };
 
 absl::StatusOr<SpatialFiles> ReadFiles(const SpatialVerb& verb) {
-  auto text = ReadTextFile(verb.program);
+  auto text = ReadProgramFile(verb.program);
   auto machine = ReadHexapodFile(verb.hexapod);
   if (!text.ok() || !machine.ok()) {
     return text.ok() ? machine.status() : text.status();
@@ -419,7 +419,7 @@ absl::Status DrawSpatial(const SpatialVerb& verb, Output& output) {
   }
   Picture picture(kSpatialWidth_px, 1500.0);
   DrawAll(picture, **answer, machine.motion, verb.colour == "speed");
-  return picture.Write(verb.out);
+  return picture.Write(verb.picture);
 }
 
 absl::Status PlaySpatial(const SpatialVerb& verb, Output& output) {
@@ -432,16 +432,18 @@ absl::Status PlaySpatial(const SpatialVerb& verb, Output& output) {
   const trajectory::PartProgram program = trajectory::ReadSpatialProgram(files->text, machine.motion);
   trajectory::SpatialPlayOptions options;
   options.cycle_s = 1.0 / verb.rate_hz;
+  output.Message(
+      fmt::format("playing {:.0f} s of the plan at {:.0f} Hz", (*answer)->plan.duration_s, verb.rate_hz));
   const trajectory::SpatialPlayReport played =
       PlaySpatialPlan(**answer, program.operations, machine, options);
   TellPlay(played, machine.motion, verb.rate_hz, output);
-  if (verb.out.empty()) {
+  if (verb.picture.empty()) {
     return absl::OkStatus();
   }
   Picture picture(kSpatialWidth_px, 1780.0);
   DrawAll(picture, **answer, machine.motion, verb.colour == "speed");
   DrawErrors(picture, 1520.0, (*answer)->plan.duration_s, played);
-  return picture.Write(verb.out);
+  return picture.Write(verb.picture);
 }
 
 }  // namespace lambdajet::cli

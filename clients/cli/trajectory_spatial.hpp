@@ -14,7 +14,8 @@ namespace lambdajet::cli {
 struct SpatialVerb {
   std::string program;
   std::string hexapod;           // YAML file
-  std::string out;               // plan: CSV; draw: picture
+  std::string out;               // plan: CSV
+  std::string picture;           // draw, play
   std::string colour = "speed";  // draw: "speed" or "limit"
   double step_s = 0.004;         // plan: distance of the CSV's points
   double feed_scale = 1.0;
@@ -24,7 +25,7 @@ struct SpatialVerb {
 absl::Status CheckSpatial(const SpatialVerb& verb, Output& output);
 absl::Status PlanSpatial(const SpatialVerb& verb, Output& output);
 absl::Status DrawSpatial(const SpatialVerb& verb, Output& output);
-// Cycle by cycle through the forward kinematics, against the program's own words; with `out` a picture.
+// Cycle by cycle through the forward kinematics, against the program's own words; with `picture` one.
 absl::Status PlaySpatial(const SpatialVerb& verb, Output& output);
 
 }  // namespace lambdajet::cli

@@ -205,7 +205,7 @@ class EveryVerb(unittest.TestCase):
         run("inspection", "path", 4711, code=REFUSED)
 
     def test_a_service_that_is_not_there_is_named(self):
-        said = Lambdajet(self, BUILD, self.folder).run("--address", "cell=127.0.0.1:1", "--timeout", 5, "job", "list", code=UNREACHABLE)
+        said = Lambdajet(self, BUILD, self.folder).run("--address", "cell=127.0.0.1:1", "--timeout-s", 5, "job", "list", code=UNREACHABLE)
         self.assertRegex(said, "cell at 127.0.0.1:1 does not answer")
 
 

@@ -81,7 +81,7 @@ class Tls(unittest.TestCase):
 
     def ask(self, *words, ca=None, own=None):
         """(exit code, all that was said)"""
-        flags = ["--announce-dir", str(self.processes.folder), "--timeout", "5"]
+        flags = ["--announce-dir", str(self.processes.folder), "--timeout-s", "5"]
         flags += ["--ca", str(ca)] if ca else []
         flags += ["--certificate", str(own[0]), "--key", str(own[1])] if own else []
         done = subprocess.run([str(BUILD / "bin" / "lambdajet"), *flags, *words], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,

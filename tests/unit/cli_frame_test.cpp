@@ -64,6 +64,8 @@ TEST(ExitCode, TellsUnreachableRefusedTimeoutAndPreconditionApart) {
   EXPECT_EQ(ExitCodeOf(absl::DeadlineExceededError("")), ExitCode::kTimeout);
   EXPECT_EQ(ExitCodeOf(absl::FailedPreconditionError("")), ExitCode::kPrecondition);
   EXPECT_EQ(ExitCodeOf(absl::InternalError("")), ExitCode::kFailure);
+  EXPECT_EQ(ExitCodeOf(ReadTextFile("/nowhere/at/all").status()), ExitCode::kUsage);
+  EXPECT_EQ(ExitCodeOf(CsvTable::Parse("", "memory").status()), ExitCode::kUsage);
 }
 
 }  // namespace
