@@ -2,10 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <deque>
+#include <numeric>
 #include <random>
+#include <vector>
 
 #include "drive/core/path_clock.hpp"
 #include "drive/core/segment_buffer.hpp"
+#include "foundation/motion/command_receiver.hpp"
+#include "foundation/motion/loop_watch.hpp"
+#include "foundation/motion/ring.hpp"
 #include "foundation/motion/sequence_guard.hpp"
 #include "foundation/motion/silence_watch.hpp"
 
@@ -294,6 +300,73 @@ TEST(SilenceWatchLaw, NewsThatAlwaysComesLateIsNoNews) {
     lost = watch.Turn(now, 20 * kMs) || lost;
   }
   EXPECT_TRUE(lost);
+}
+
+TEST(LoopWatchLaw, SaysTooManyExactlyWhenSoManyOfTheNewestWereLate) {
+  constexpr std::int64_t kPeriod_ns = 1'000'000;
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    Dice dice(seed);
+    const int window = 1 + dice.Below(120), allowed = dice.Below(20);
+    LoopWatch watch(kPeriod_ns, static_cast<std::uint32_t>(window), allowed);
+    std::vector<int> late;
+    std::int64_t now_ns = 5'000'000;
+    EXPECT_FALSE(watch.Turn(now_ns)) << "the first cycle is not late";
+    for (int i = 0; i < 2000; ++i) {
+      late.push_back(dice.Below(8) == 0 ? 1 : 0);
+      now_ns += late.back() != 0 ? kPeriod_ns * 3 / 2 + 1 : kPeriod_ns * 3 / 2;
+      const auto newest = late.end() - std::min<std::ptrdiff_t>(window, std::ssize(late));
+      ASSERT_EQ(watch.Turn(now_ns), std::accumulate(newest, late.end(), 0) > allowed) << seed << ' ' << i;
+    }
+    EXPECT_EQ(watch.overruns(), std::accumulate(late.begin(), late.end(), 0u));
+  }
+}
+
+TEST(RingLaw, GivesWhatWasPutInOrderAndTakesNoMoreThanItHolds) {
+  Dice dice(3);
+  Ring<int, 7> ring;
+  std::deque<int> model;
+  for (int i = 0; i < 20000; ++i) {
+    if (dice.Below(2) == 0) {
+      ASSERT_EQ(ring.Put(i), model.size() < 7);
+      model.size() < 7 ? model.push_back(i) : void();
+    } else {
+      const std::optional<int> taken = ring.Take();
+      ASSERT_EQ(taken, model.empty() ? std::nullopt : std::optional(model.front()));
+      model.empty() ? void() : model.pop_front();
+    }
+    ASSERT_EQ(ring.empty(), model.empty());
+  }
+  ring.Clear();
+  EXPECT_TRUE(ring.empty());
+}
+
+TEST(CommandReceiver, ObeysEachCommandOnceInTimeAndAStopHoweverOld) {
+  CommandReceiver receiver(kTargetDrive, 1000);
+  CommandReceipt receipt;
+  int obeyed = 0;
+  const auto tell = [&](std::uint64_t number, Verb verb, std::int64_t made_ns, std::uint32_t target,
+                        ModuleReason answer = ModuleReason::kNone) {
+    ModuleCommand command;
+    command.header = {9, number, made_ns};
+    command.target = target;
+    command.verb = verb;
+    receiver.Take(command, 10'000, receipt, [&](const ModuleCommand&) { return ++obeyed, answer; });
+    return receipt.sequence_number == number;
+  };
+  EXPECT_FALSE(tell(1, Verb::kHold, 9'500, kTargetMainMotion)) << "not for this module";
+  EXPECT_TRUE(tell(2, Verb::kHold, 9'500, kTargetDrive | kTargetMainMotion));
+  EXPECT_EQ(receipt.answer, CommandAnswer::kDone);
+  tell(2, Verb::kHold, 9'500, kTargetDrive);
+  EXPECT_EQ(obeyed, 1) << "repeated";
+  EXPECT_EQ(receiver.dropped(), 1u);
+  EXPECT_TRUE(tell(3, Verb::kHold, 8'999, kTargetDrive));
+  EXPECT_EQ(receipt.reason, ModuleReason::kStaleCommand);
+  EXPECT_EQ(obeyed, 1);
+  EXPECT_TRUE(tell(4, Verb::kStop, 0, kTargetDrive));
+  EXPECT_EQ(receipt.answer, CommandAnswer::kDone);
+  EXPECT_TRUE(tell(5, Verb::kResume, 9'500, kTargetDrive, ModuleReason::kWrongMode));
+  EXPECT_EQ(receipt.answer, CommandAnswer::kRefused);
+  EXPECT_EQ(receipt.reason, ModuleReason::kWrongMode);
 }
 
 }  // namespace

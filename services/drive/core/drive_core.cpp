@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstddef>
 
+#include "foundation/motion/nanoseconds.hpp"
+
 namespace lambdajet::drive {
 namespace {
 
@@ -19,13 +21,6 @@ constexpr int kCatchUpCycles = 512;
 constexpr double kSmallestRateAcceleration =
     0.8;  // a hold must come to an end, whatever the path asks of the actuators
 
-std::int64_t ToNs(double s) { return static_cast<std::int64_t>(std::llround(1e9 * s)); }
-
-bool PeerDown(ModuleMode mode) {
-  return mode == kOff || mode == kInitialising || mode == kSafe || mode == kStopping || mode == kStopped ||
-         mode == kFault;
-}
-
 }  // namespace
 
 DriveCore::DriveCore(const DriveConfig& config, DriveHardware& hardware)
@@ -36,7 +31,8 @@ DriveCore::DriveCore(const DriveConfig& config, DriveHardware& hardware)
       play_({.period_ns = period_ns_, .lead_ns = ToNs(config.setpoint_lead_s), .guard_ns = 2 * period_ns_},
             buffer_),
       peer_watch_(period_ns_),
-      late_cycles_(config.overrun_window, 0) {
+      commands_(kTargetDrive, ToNs(config.command_age_limit_s)),
+      loop_watch_(period_ns_, config.overrun_window, config.overruns_allowed) {
   gates_.reserve(kGateCapacity);
   state_.header.session = config.session;
 }
@@ -54,7 +50,6 @@ void DriveCore::AdoptMachine(const MachineDescription& machine) {
 }
 
 void DriveCore::Step(std::int64_t now_ns, const DriveInputs& inputs) {
-  last_step_ns_ = now_ns_;
   now_ns_ = now_ns;
   ++state_.header.sequence_number;
   state_.header.time_ns = now_ns;
@@ -79,13 +74,7 @@ void DriveCore::Step(std::int64_t now_ns, const DriveInputs& inputs) {
   Report();
 }
 
-std::optional<ModeChange> DriveCore::TakeModeChange() {
-  if (changes_taken_ == changes_made_) {
-    return std::nullopt;
-  }
-  changes_taken_ = std::max(changes_taken_, changes_made_ > kModeChanges ? changes_made_ - kModeChanges : 0);
-  return changes_[changes_taken_++ % kModeChanges];
-}
+std::optional<ModeChange> DriveCore::TakeModeChange() { return changes_.Take(); }
 
 // ---- inputs
 
@@ -99,7 +88,7 @@ void DriveCore::TakeInputs(const DriveInputs& inputs) {
     TakePeer(peer);
   }
   for (const ModuleCommand& command : inputs.commands) {
-    TakeCommand(command);
+    commands_.Take(command, now_ns_, state_.command, [this](const ModuleCommand& c) { return Obey(c); });
   }
   for (const ProcessBatch& batch : inputs.process) {
     TakeGates(batch);
@@ -124,22 +113,6 @@ void DriveCore::TakePeer(const MainMotionState& peer) {
   }
   peer_ = peer;
   peer_watch_.Heard(peer.header.time_ns);
-}
-
-void DriveCore::TakeCommand(const ModuleCommand& command) {
-  if ((command.target & kTargetDrive) == 0) {
-    return;
-  }
-  const SampleVerdict verdict = command_guard_.Judge(command.header);
-  if (verdict == SampleVerdict::kOld || verdict == SampleVerdict::kTwoWriters) {
-    return;
-  }
-  const bool stale = now_ns_ - command.header.time_ns > ToNs(config_.command_age_limit_s);
-  // A stop is obeyed however old it is.
-  const ModuleReason refusal =
-      stale && command.verb != Verb::kStop ? ModuleReason::kStaleCommand : Obey(command);
-  state_.command = {command.header.session, command.header.sequence_number,
-                    refusal == ModuleReason::kNone ? CommandAnswer::kDone : CommandAnswer::kRefused, refusal};
 }
 
 // kNone: done.
@@ -304,16 +277,7 @@ void DriveCore::TakeGates(const ProcessBatch& batch) {
 // ---- watches
 
 void DriveCore::WatchLoop() {
-  if (last_step_ns_ == 0) {
-    return;
-  }
-  const bool late = now_ns_ - last_step_ns_ > period_ns_ + period_ns_ / 2;
-  overruns_ += late ? 1 : 0;
-  late_count_ += late ? 1 : 0;
-  late_count_ -= late_cycles_[late_at_];
-  late_cycles_[late_at_] = late ? 1 : 0;
-  late_at_ = (late_at_ + 1) % late_cycles_.size();
-  if (late_count_ > config_.overruns_allowed && Moving()) {
+  if (loop_watch_.Turn(now_ns_) && Moving()) {
     Apply(Event::kStop, ModuleReason::kOverruns);
   }
   if (play_.Behind(now_ns_) && Moving()) {  // the servo has run dry and braked by itself
@@ -535,8 +499,7 @@ bool DriveCore::Apply(Event event, ModuleReason reason) {
   }
   if (mode_ != from) {
     mode_since_ = state_.header.sequence_number;
-    changes_[changes_made_++ % kModeChanges] = {now_ns_, from,     mode_,
-                                                reason_, plan_.id, play_.PointAt(now_ns_).s_mm};
+    changes_.Put({now_ns_, from, mode_, reason_, plan_.id, play_.PointAt(now_ns_).s_mm});
   }
   if (from == kRunning || from == kResuming) {
     cutting_at_hold_ = (from == kResuming && cutting_at_hold_) || peer_.jet_on;
@@ -743,7 +706,7 @@ bool DriveCore::Moving() const {
 bool DriveCore::Standing() const { return play_.At(now_ns_).standing() && play_.head().standing(); }
 
 bool DriveCore::PeerFit() const {
-  return !peer_lost_ && !peer_restarted_ && !PeerDown(peer_.mode) && peer_.plan == plan_.id && plan_.id != 0;
+  return !peer_lost_ && !peer_restarted_ && !IsDown(peer_.mode) && peer_.plan == plan_.id && plan_.id != 0;
 }
 
 // Main motion says so, and says that it has heard of this standstill.
@@ -793,9 +756,9 @@ void DriveCore::Report() {
   state_.actuator_velocity_mm_per_s = readings_.velocity_mm_per_s;
   state_.peer_session = peer_guard_.session();
   state_.peer_sequence_number = peer_guard_.sequence_number();
-  state_.loop_overruns = overruns_;
+  state_.loop_overruns = loop_watch_.overruns();
   state_.dropped_samples =
-      peer_guard_.dropped() + command_guard_.dropped() + segment_guard_.dropped() + process_guard_.dropped();
+      peer_guard_.dropped() + commands_.dropped() + segment_guard_.dropped() + process_guard_.dropped();
 }
 
 }  // namespace lambdajet::drive

@@ -22,7 +22,10 @@
 #include "drive/core/segment_buffer.hpp"
 #include "drive/core/state_table.hpp"
 #include "foundation/machine/machine_description.hpp"
+#include "foundation/motion/command_receiver.hpp"
 #include "foundation/motion/link_samples.hpp"
+#include "foundation/motion/loop_watch.hpp"
+#include "foundation/motion/ring.hpp"
 #include "foundation/motion/sequence_guard.hpp"
 #include "foundation/motion/silence_watch.hpp"
 
@@ -104,7 +107,6 @@ class DriveCore {
   // Inputs.
   void TakeInputs(const DriveInputs& inputs);
   void TakePeer(const MainMotionState& peer);
-  void TakeCommand(const ModuleCommand& command);
   ModuleReason Obey(const ModuleCommand& command);
   ModuleReason ObeyLoad(const ModuleCommand& command);
   ModuleReason ObeyArm(const ModuleCommand& command);
@@ -159,7 +161,6 @@ class DriveCore {
   LoadedPlan plan_;
 
   std::int64_t now_ns_ = 0;
-  std::int64_t last_step_ns_ = 0;
   ModuleMode mode_ = ModuleMode::kOff;
   ModuleReason reason_ = ModuleReason::kNone;
   double override_ = 1.0;
@@ -183,25 +184,18 @@ class DriveCore {
 
   MainMotionState peer_;
   SequenceGuard peer_guard_;
-  SequenceGuard command_guard_;
   SequenceGuard segment_guard_;
   SequenceGuard process_guard_;
   SilenceWatch peer_watch_;
+  CommandReceiver commands_;
+  LoopWatch loop_watch_;
   bool peer_lost_ = true;
   bool peer_restarted_ = false;
   std::int64_t peer_unfit_since_ns_ = 0;
 
   std::uint32_t following_cycles_ = 0;
   std::uint32_t rejected_segments_ = 0;
-  std::uint32_t overruns_ = 0;
-  std::vector<std::uint8_t> late_cycles_;
-  std::size_t late_at_ = 0;
-  int late_count_ = 0;
-
-  static constexpr std::size_t kModeChanges = 64;
-  std::array<ModeChange, kModeChanges> changes_{};
-  std::size_t changes_made_ = 0;
-  std::size_t changes_taken_ = 0;
+  Ring<ModeChange, 64> changes_;
 };
 
 }  // namespace lambdajet::drive

@@ -5,6 +5,7 @@
 #include <cstddef>
 
 #include "foundation/contract/expects.hpp"
+#include "foundation/motion/nanoseconds.hpp"
 
 namespace lambdajet::drive {
 namespace {
@@ -96,7 +97,7 @@ void PlayOut::ForgetPlan() { SetPlan(0, 0.0); }
 
 Setpoint PlayOut::Advance() {
   head_.time_ns += timing_.period_ns;
-  const double dt_s = 1e-9 * static_cast<double>(timing_.period_ns);
+  const double dt_s = ToSeconds(timing_.period_ns);
   switch (head_.source) {
     case PlaySource::kStand:
       BeginIfDue(head_);
@@ -136,7 +137,7 @@ PathPoint PlayOut::PointAt(std::int64_t time_ns) const {
   const double t = head.clock.tau_s() - segment.start_s;
   const double w = head.clock.rate();
   const double first = segment.s_mm.first(t);
-  const double dt_s = 1e-9 * static_cast<double>(time_ns - head.time_ns);
+  const double dt_s = ToSeconds(time_ns - head.time_ns);
   point.s_rate_mm_per_s = first * w;
   point.s_acceleration_mm_per_s2 = segment.s_mm.second(t) * w * w + first * head.clock.rate_per_s();
   point.s_mm =
@@ -149,7 +150,7 @@ PathPoint PlayOut::PointAt(std::int64_t time_ns) const {
 Setpoint PlayOut::SetpointAt(std::int64_t time_ns) const {
   const PlayHead head = At(time_ns);
   Setpoint setpoint = Evaluate(head);
-  const double dt_s = 1e-9 * static_cast<double>(std::min(time_ns - head.time_ns, timing_.period_ns));
+  const double dt_s = ToSeconds(std::min(time_ns - head.time_ns, timing_.period_ns));
   for (std::size_t i = 0; i < kActuatorCount; ++i) {
     setpoint.position_mm[i] += setpoint.velocity_mm_per_s[i] * std::max(0.0, dt_s);
   }
@@ -189,7 +190,7 @@ void PlayOut::BeginIfDue(PlayHead& head) const {
   head.clock.StandAt(start_tau_s_);
   head.clock.RunAt(start_rate_);
   head.wanted_rate = start_rate_;
-  AdvancePlan(head, 1e-9 * static_cast<double>(head.time_ns - start_at_ns_));
+  AdvancePlan(head, ToSeconds(head.time_ns - start_at_ns_));
 }
 
 void PlayOut::AdvancePositioning(PlayHead& head, double dt_s) const {

@@ -7,7 +7,7 @@
 #include <optional>
 #include <span>
 
-#include "foundation/motion/module_words.hpp"
+#include "foundation/motion/state_table.hpp"
 
 namespace lambdajet::drive {
 
@@ -55,17 +55,8 @@ enum class Action {
   kDisable
 };
 
-struct Transition {
-  ModuleMode mode;
-  Action action;
-  friend bool operator==(const Transition&, const Transition&) = default;
-};
-
-struct Row {
-  ModuleMode mode;
-  Event event;
-  Transition transition;
-};
+using Transition = ModeTransition<Action>;
+using Row = ModeRow<Event, Action>;
 
 std::span<const Row> StateTable();
 std::optional<Transition> Next(ModuleMode mode, Event event);

@@ -41,6 +41,12 @@ std::string_view At(const std::array<std::string_view, N>& names, std::uint32_t 
 
 }  // namespace
 
+bool IsDown(ModuleMode mode) {
+  using enum ModuleMode;
+  return mode == kOff || mode == kInitialising || mode == kSafe || mode == kStopping || mode == kStopped ||
+         mode == kFault;
+}
+
 std::string_view Name(ModuleMode mode) { return At(kModes, static_cast<std::uint32_t>(mode)); }
 std::string_view Name(Verb verb) { return At(kVerbs, static_cast<std::uint32_t>(verb)); }
 std::string_view Name(ModuleReason reason) { return At(kReasons, static_cast<std::uint32_t>(reason)); }

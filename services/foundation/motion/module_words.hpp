@@ -66,6 +66,9 @@ enum class ModuleReason : std::uint32_t {
   kJetNotClosed   // water still flows long after the valve was told to close
 };
 
+// Plays no path and obeys none: stands, or is about to, and needs a person or its own start before it may move.
+bool IsDown(ModuleMode mode);
+
 // UPPER_SNAKE, as on every wire: "PEER_LOST".
 std::string_view Name(ModuleMode mode);
 std::string_view Name(Verb verb);

@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "foundation/motion/nanoseconds.hpp"
+
 namespace lambdajet::main_motion {
 namespace {
 
 constexpr double kTouch_mm = 1e-6;  // this near counts as there: the path may stand exactly at an event
-
-double Seconds(std::int64_t ns) { return 1e-9 * static_cast<double>(ns); }
 
 // Smallest dt >= 0 with rate dt + acceleration/2 dt^2 = way, way > 0; nothing if the motion stops before.
 std::optional<double> TimeFor(double way, double rate, double acceleration, double horizon_s) {
@@ -28,8 +28,8 @@ struct Hermite {
 };
 
 Hermite Between(const DriveState& a, const DriveState& b, std::int64_t time_ns) {
-  const double h = Seconds(b.header.time_ns - a.header.time_ns);
-  const double u = Seconds(time_ns - a.header.time_ns) / h;
+  const double h = ToSeconds(b.header.time_ns - a.header.time_ns);
+  const double u = ToSeconds(time_ns - a.header.time_ns) / h;
   const double da = h * a.s_rate_mm_per_s;
   const double db = h * b.s_rate_mm_per_s;
   const double ds = b.s_mm - a.s_mm;
@@ -70,7 +70,7 @@ std::optional<double> DriveTrack::PathLengthAt(std::int64_t time_ns) const {
   if (after != nullptr) {
     return Between(*before, *after, time_ns).value;
   }
-  const double dt = Seconds(time_ns - before->header.time_ns);
+  const double dt = ToSeconds(time_ns - before->header.time_ns);
   return before->s_mm + (before->s_rate_mm_per_s + 0.5 * before->s_acceleration_mm_per_s2 * dt) * dt;
 }
 
@@ -84,7 +84,7 @@ std::optional<double> DriveTrack::PathRateAt(std::int64_t time_ns) const {
     return Between(*before, *after, time_ns).first;
   }
   return before->s_rate_mm_per_s +
-         before->s_acceleration_mm_per_s2 * Seconds(time_ns - before->header.time_ns);
+         before->s_acceleration_mm_per_s2 * ToSeconds(time_ns - before->header.time_ns);
 }
 
 std::optional<ActuatorPoint> DriveTrack::ActuatorsAt(std::int64_t time_ns) const {
@@ -93,8 +93,8 @@ std::optional<ActuatorPoint> DriveTrack::ActuatorsAt(std::int64_t time_ns) const
   if (before == nullptr || after == nullptr) {
     return std::nullopt;
   }
-  const double h = Seconds(after->header.time_ns - before->header.time_ns);
-  const double u = Seconds(time_ns - before->header.time_ns) / h;
+  const double h = ToSeconds(after->header.time_ns - before->header.time_ns);
+  const double u = ToSeconds(time_ns - before->header.time_ns) / h;
   ActuatorPoint point;
   for (std::size_t i = 0; i < kActuatorCount; ++i) {
     point.position_mm[i] = before->actuator_position_mm[i] +

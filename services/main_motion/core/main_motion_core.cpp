@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <utility>
 
+#include "foundation/motion/nanoseconds.hpp"
+
 namespace lambdajet::main_motion {
 namespace {
 
@@ -23,9 +25,6 @@ constexpr std::int32_t kFirstHole = 1000;
 constexpr std::int64_t kSpread_ns =
     4'000'000;  // half width of the difference that gives slider accelerations
 
-std::int64_t ToNs(double s) { return static_cast<std::int64_t>(std::llround(1e9 * s)); }
-double ToSeconds(std::int64_t ns) { return 1e-9 * static_cast<double>(ns); }
-
 bool OnValve(ProcessAction action) {
   return action != ProcessAction::kCameraTrackOn && action != ProcessAction::kCameraTrackOff;
 }
@@ -39,10 +38,6 @@ bool TurnsOn(ProcessAction action) {
   return action == ProcessAction::kJetOn || action == ProcessAction::kAbrasiveOn ||
          action == ProcessAction::kAbrasiveFlow;
 }
-bool PeerDown(ModuleMode mode) {
-  return mode == kOff || mode == kInitialising || mode == kSafe || mode == kStopping || mode == kStopped ||
-         mode == kFault;
-}
 
 }  // namespace
 
@@ -51,7 +46,8 @@ MainMotionCore::MainMotionCore(const MainMotionConfig& config, MainMotionHardwar
       hardware_(hardware),
       period_ns_(ToNs(config.period_s)),
       peer_watch_(period_ns_),
-      late_cycles_(config.overrun_window, 0) {
+      commands_(kTargetMainMotion, ToNs(config.command_age_limit_s)),
+      loop_watch_(period_ns_, config.overrun_window, config.overruns_allowed) {
   gates_.reserve(kPlanCapacity);
   events_.reserve(kPlanCapacity);
   progress_.reserve(kPlanCapacity);
@@ -76,7 +72,6 @@ void MainMotionCore::AdoptMachine(const MachineDescription& machine) {
 }
 
 void MainMotionCore::Step(std::int64_t now_ns, const MainMotionInputs& inputs) {
-  last_step_ns_ = now_ns_;
   now_ns_ = now_ns;
   ++state_.header.sequence_number;
   state_.header.time_ns = now_ns;
@@ -112,7 +107,7 @@ std::optional<ProcessRecord> MainMotionCore::TakeProcessRecord() { return record
 void MainMotionCore::TakeInputs(const MainMotionInputs& inputs) {
   state_.link = inputs.link;
   for (const ModuleCommand& command : inputs.commands) {
-    TakeCommand(command);
+    commands_.Take(command, now_ns_, state_.command, [this](const ModuleCommand& c) { return Obey(c); });
   }
   for (const ProcessBatch& batch : inputs.process) {
     TakeProcess(batch);
@@ -145,22 +140,6 @@ void MainMotionCore::TakePeer(const DriveState& peer) {
   }
   track_.Heard(peer);
   peer_watch_.Heard(peer.header.time_ns);
-}
-
-void MainMotionCore::TakeCommand(const ModuleCommand& command) {
-  if ((command.target & kTargetMainMotion) == 0) {
-    return;
-  }
-  const SampleVerdict verdict = command_guard_.Judge(command.header);
-  if (verdict == SampleVerdict::kOld || verdict == SampleVerdict::kTwoWriters) {
-    return;
-  }
-  const bool stale = now_ns_ - command.header.time_ns > ToNs(config_.command_age_limit_s);
-  // A stop is obeyed however old it is.
-  const ModuleReason refusal =
-      stale && command.verb != Verb::kStop ? ModuleReason::kStaleCommand : Obey(command);
-  state_.command = {command.header.session, command.header.sequence_number,
-                    refusal == ModuleReason::kNone ? CommandAnswer::kDone : CommandAnswer::kRefused, refusal};
 }
 
 ModuleReason MainMotionCore::Obey(const ModuleCommand& command) {
@@ -249,16 +228,7 @@ void MainMotionCore::TakeProcess(const ProcessBatch& batch) {
 // ---- watches
 
 void MainMotionCore::WatchLoop() {
-  if (last_step_ns_ == 0) {
-    return;
-  }
-  const bool late = now_ns_ - last_step_ns_ > period_ns_ + period_ns_ / 2;
-  overruns_ += late ? 1 : 0;
-  late_count_ += late ? 1 : 0;
-  late_count_ -= late_cycles_[late_at_];
-  late_cycles_[late_at_] = late ? 1 : 0;
-  late_at_ = (late_at_ + 1) % late_cycles_.size();
-  if (late_count_ > config_.overruns_allowed && (mode_ == kRunning || mode_ == kResuming)) {
+  if (loop_watch_.Turn(now_ns_) && (mode_ == kRunning || mode_ == kResuming)) {
     Apply(Event::kStop, ModuleReason::kOverruns);
   }
 }
@@ -307,7 +277,7 @@ void MainMotionCore::FollowDrive() {
     return;
   }
   const DriveState& drive = track_.newest();
-  if (PeerDown(drive.mode) || (drive.plan != plan_ && Busy() && mode_ != kComplete)) {
+  if (IsDown(drive.mode) || (drive.plan != plan_ && Busy() && mode_ != kComplete)) {
     if (Busy() && mode_ != kComplete && mode_ != kArmed) {
       Apply(Event::kStop, ModuleReason::kPeerStopped);
     }
@@ -642,8 +612,8 @@ void MainMotionCore::LearnDelay(const OutputEffect& effect, std::int64_t command
 }
 
 void MainMotionCore::SettleRecords() {
-  while (pending_records_.made != pending_records_.taken) {
-    const PendingRecord& pending = pending_records_.items[pending_records_.taken % 64];
+  while (!pending_records_.empty()) {
+    const PendingRecord& pending = pending_records_.oldest();
     if (!track_.Covers(pending.effect_ns) && !peer_lost_) {
       return;
     }
@@ -665,7 +635,7 @@ void MainMotionCore::SettleRecords() {
       record.peer_age_s = pending.peer_age_s;
       records_.Put(record);
     }
-    ++pending_records_.taken;
+    pending_records_.Take();
   }
 }
 
@@ -694,12 +664,12 @@ void MainMotionCore::TakePictures() {
 
 // A picture waits until drive states on both sides of its exposure have come.
 void MainMotionCore::SettlePictures() {
-  while (pending_pictures_.made != pending_pictures_.taken) {
-    Measurement& measurement = pending_pictures_.items[pending_pictures_.taken % 64];
+  while (!pending_pictures_.empty()) {
+    Measurement& measurement = pending_pictures_.oldest();
     if (!track_.Covers(measurement.exposure_ns + kSpread_ns) && !peer_lost_) {
       return;
     }
-    ++pending_pictures_.taken;
+    pending_pictures_.Take();
     const std::optional<ActuatorPoint> at = track_.ActuatorsAt(measurement.exposure_ns);
     const std::optional<ActuatorPoint> before = track_.ActuatorsAt(measurement.exposure_ns - kSpread_ns);
     const std::optional<ActuatorPoint> after = track_.ActuatorsAt(measurement.exposure_ns + kSpread_ns);
@@ -757,8 +727,8 @@ void MainMotionCore::Act(Action action) {
       progress_.clear();
       holes_.clear();
       first_unfired_ = events_executed_ = gate_passed_ = 0;
-      pending_records_.taken = pending_records_.made;
-      pending_pictures_.taken = pending_pictures_.made;
+      pending_records_.Clear();
+      pending_pictures_.Clear();
       asked_ = {};
       tracking_ = false;
       track_.Clear();
@@ -933,9 +903,9 @@ void MainMotionCore::Report() {
   state_.peer_session = peer_guard_.session();
   state_.peer_sequence_number = peer_guard_.sequence_number();
   state_.peer_age_s = track_.empty() ? 0.0 : ToSeconds(peer_watch_.age_ns(now_ns_));
-  state_.loop_overruns = overruns_;
+  state_.loop_overruns = loop_watch_.overruns();
   state_.dropped_samples =
-      peer_guard_.dropped() + command_guard_.dropped() + process_guard_.dropped() + segment_guard_.dropped();
+      peer_guard_.dropped() + commands_.dropped() + process_guard_.dropped() + segment_guard_.dropped();
 }
 
 }  // namespace lambdajet::main_motion

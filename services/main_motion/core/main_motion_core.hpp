@@ -18,7 +18,10 @@
 #include <vector>
 
 #include "foundation/machine/machine_description.hpp"
+#include "foundation/motion/command_receiver.hpp"
 #include "foundation/motion/link_samples.hpp"
+#include "foundation/motion/loop_watch.hpp"
+#include "foundation/motion/ring.hpp"
 #include "foundation/motion/sequence_guard.hpp"
 #include "foundation/motion/silence_watch.hpp"
 #include "main_motion/core/drive_track.hpp"
@@ -92,24 +95,9 @@ class MainMotionCore {
     std::uint32_t gate = 0;
     std::int32_t mark = 0;
   };
-  template <typename T, std::size_t N>
-  struct Ring {
-    std::array<T, N> items{};
-    std::size_t made = 0;
-    std::size_t taken = 0;
-    bool Put(const T& item) {
-      if (made - taken == N) {
-        return false;
-      }
-      items[made++ % N] = item;
-      return true;
-    }
-    std::optional<T> Take() { return made == taken ? std::nullopt : std::optional<T>(items[taken++ % N]); }
-  };
 
   void TakeInputs(const MainMotionInputs& inputs);
   void TakePeer(const DriveState& peer);
-  void TakeCommand(const ModuleCommand& command);
   ModuleReason Obey(const ModuleCommand& command);
   ModuleReason ObeyLoad(const ModuleCommand& command);
   ModuleReason ObeyArm(const ModuleCommand& command);
@@ -184,7 +172,6 @@ class MainMotionCore {
   std::vector<std::array<double, kActuatorCount>> holes_;  // slider readings at each pierced hole
 
   std::int64_t now_ns_ = 0;
-  std::int64_t last_step_ns_ = 0;
   ModuleMode mode_ = ModuleMode::kOff;
   ModuleReason reason_ = ModuleReason::kNone;
   bool homing_ = false;
@@ -220,16 +207,13 @@ class MainMotionCore {
   Ring<ModeChange, 64> changes_;
 
   SequenceGuard peer_guard_;
-  SequenceGuard command_guard_;
   SequenceGuard process_guard_;
   SequenceGuard segment_guard_;
   SilenceWatch peer_watch_;
+  CommandReceiver commands_;
+  LoopWatch loop_watch_;
   bool peer_lost_ = true;
   std::int64_t pressure_low_since_ns_ = 0;
-  std::uint32_t overruns_ = 0;
-  std::vector<std::uint8_t> late_cycles_;
-  std::size_t late_at_ = 0;
-  int late_count_ = 0;
   std::uint64_t measurement_sequence_ = 0;
   std::uint64_t record_sequence_ = 0;
 };

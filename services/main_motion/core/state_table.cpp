@@ -90,12 +90,7 @@ constexpr std::array kTable = std::to_array<Row>({
 std::span<const Row> StateTable() { return kTable; }
 
 std::optional<Transition> Next(ModuleMode mode, Event event) {
-  for (const Row& row : kTable) {
-    if (row.mode == mode && row.event == event) {
-      return row.transition;
-    }
-  }
-  return std::nullopt;
+  return FindTransition(StateTable(), mode, event);
 }
 
 }  // namespace lambdajet::main_motion

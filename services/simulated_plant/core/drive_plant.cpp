@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "foundation/contract/expects.hpp"
+#include "foundation/motion/nanoseconds.hpp"
 #include "simulated_plant/core/true_mechanism.hpp"
 
 namespace lambdajet::simulated_plant {
@@ -16,8 +17,6 @@ constexpr double kHoming_s = 1.0;
 constexpr double kBrake_mm_per_s2 = 4000.0;
 constexpr std::int64_t kLongestPause_ns = 2'000'000'000;
 constexpr double kGramPerKilo = 1000.0;  // kg mm/s^2 in mN: N/mm * 1000 / kg is 1/s^2
-
-std::int64_t ToNs(double s) { return static_cast<std::int64_t>(std::llround(1e9 * s)); }
 
 Oscillator Lever(double stiffness_n_per_mm, const LeversTruth& levers) {
   return {std::sqrt(kGramPerKilo * stiffness_n_per_mm / levers.moving_mass_kg), levers.damping_ratio,
@@ -54,7 +53,7 @@ drive::DriveReadings DrivePlant::ReadState(std::int64_t now_ns) {
   }
   drive::DriveReadings readings;
   readings.time_ns = now_ns;
-  const double ahead_s = 1e-9 * static_cast<double>(now_ns - time_ns_);
+  const double ahead_s = ToSeconds(now_ns - time_ns_);
   for (std::size_t i = 0; i < kActuatorCount; ++i) {
     readings.position_mm[i] = Reading(i, ahead_s);
     readings.velocity_mm_per_s[i] = servos_[i].velocity_mm_per_s;
@@ -160,8 +159,8 @@ void DrivePlant::FollowSetpoint() {
     return;
   }
   const drive::Setpoint& next = queue_[queue_first_];
-  const double h = 1e-9 * static_cast<double>(next.execute_at_ns - played_.execute_at_ns);
-  const double u = 1e-9 * static_cast<double>(time_ns_ - played_.execute_at_ns) / h;
+  const double h = ToSeconds(next.execute_at_ns - played_.execute_at_ns);
+  const double u = ToSeconds(time_ns_ - played_.execute_at_ns) / h;
   for (std::size_t i = 0; i < kActuatorCount; ++i) {
     const double da = h * played_.velocity_mm_per_s[i];
     const double db = h * next.velocity_mm_per_s[i];

@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <numbers>
 
+#include "foundation/motion/nanoseconds.hpp"
+
 namespace lambdajet::simulated_plant {
 namespace {
 
@@ -15,8 +17,6 @@ constexpr std::int64_t kBlind_ns = 500'000'000;  // a picture without known trut
 constexpr std::int64_t kLongestPause_ns = 2'000'000'000;
 constexpr std::int64_t kPiercing_ns = 400'000'000;  // the stretch of a pierce that makes the hole
 constexpr std::int64_t kPiercingStep_ns = 10'000'000;
-
-std::int64_t ToNs(double s) { return static_cast<std::int64_t>(std::llround(1e9 * s)); }
 
 }  // namespace
 
