@@ -3,6 +3,7 @@
 import json
 import os
 import pathlib
+import re
 import secrets
 import shutil
 import signal
@@ -30,6 +31,12 @@ REAL_TIME_US_OF_ALL = 850_000
 REAL_TIME_US_OF_A_MODULE = 200_000
 
 
+def tell_image_step(line):
+    """What takes long while an image is made: the commands that run in it, and how far the build is."""
+    if re.match(r"(\[\d+/\d+\] )?STEP \S+ RUN ", line) or line.startswith(("build: ", "install: ")):
+        print(f"    {line:.110}", flush=True)
+
+
 class Containers:
     """The same face as cell_processes.LocalProcesses."""
 
@@ -51,16 +58,23 @@ class Containers:
         self.up = False
         self.found = {}
 
-    def call(self, *command, check=True):
-        """Runs a command in a session of its own: Ctrl-C reaches only this program, which ends the command and then the cell."""
+    def call(self, *command, check=True, tell=None):
+        """Runs a command in a session of its own: Ctrl-C reaches only this program, which ends the command and then the cell.
+        tell: called with each line that the command says."""
         child = subprocess.Popen(command, env=self.environment, cwd=self.source, stdin=subprocess.DEVNULL, start_new_session=True,
                                  stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace")
+        lines = []
         try:
-            output, _ = child.communicate()
+            for line in child.stdout:
+                lines.append(line)
+                if tell:
+                    tell(line.rstrip())
+            child.wait()
         except BaseException:
             os.killpg(child.pid, signal.SIGTERM)
             child.wait()
             raise
+        output = "".join(lines)
         if check and child.returncode != 0:
             tail = "\n".join(output.strip().splitlines()[-15:])
             raise StartFailed(f"'{' '.join(command[:3])} …' ended with {child.returncode}:\n{tail}")
@@ -103,7 +117,7 @@ class Containers:
         began = time.monotonic()
         self.call("buildah", "bud", "--isolation", "chroot", "--layers", "--force-rm", "--build-arg", f"BASE={BASE}",
                   "--build-arg", f"PROGRAMS={programs}", "--volume", f"{cache}:/ccache", "--tag", IMAGE,
-                  "--file", "deploy/Containerfile", ".")
+                  "--file", "deploy/Containerfile", ".", tell=tell_image_step)
         print(f"  the image is there after {time.monotonic() - began:.0f} s", flush=True)
 
     def real_time_words(self):

@@ -20,7 +20,7 @@ def parse():
         prog="deploy/demo",
         description="Installs, builds, starts seven processes and the judge, and runs the main job: verify the base, cut the "
         "part as set up, identify, cut identified, cut identified and compensated, inspect each. Takes about four minutes "
-        "after the build. Writes build/demo/report.json and build/demo/report.html. Ctrl-C stops everything in order.",
+        "after the build (about 11 minutes on two cores). Writes build/demo/report.json and build/demo/report.html. Ctrl-C stops everything in order.",
     )
     parts = SOURCE / "deploy" / "parts"
     parser.add_argument("--plant", type=pathlib.Path, default=SOURCE / "deploy" / "plants" / "shipped.yaml",
@@ -31,7 +31,8 @@ def parse():
     parser.add_argument("--machine", type=pathlib.Path, default=SOURCE / "deploy" / "config" / "machine.yaml",
                         help="the machine as designed (default: deploy/config/machine.yaml)")
     parser.add_argument("--keep", action="store_true", help="leave the cell running for clients after the job; Ctrl-C ends it")
-    parser.add_argument("--containers", action="store_true", help="every process in a container of its own (podman, root)")
+    parser.add_argument("--containers", action="store_true", help="every process in a container of its own (podman, root); the image compiles the sources itself, which takes as long "
+                        "as the build and is kept for the next time")
     parser.add_argument("--output", type=pathlib.Path, default=SOURCE / "build" / "demo", help="folder of the report (default: build/demo)")
     parser.add_argument("--build-folder", type=pathlib.Path, default=SOURCE / "build" / "release", help=argparse.SUPPRESS)
     parser.add_argument("--domain", type=int, help=argparse.SUPPRESS)  # tests: a DDS domain of their own
