@@ -33,14 +33,14 @@ def parse():
     parser.add_argument("--keep", action="store_true", help="leave the cell running for clients after the job; Ctrl-C ends it")
     parser.add_argument("--containers", action="store_true", help="every process in a container of its own (podman, root); the image compiles the sources itself, which takes as long "
                         "as the build and is kept for the next time")
-    parser.add_argument("--output", type=pathlib.Path, default=SOURCE / "build" / "demo", help="folder of the report (default: build/demo)")
+    parser.add_argument("--out", type=pathlib.Path, default=SOURCE / "build" / "demo", help="folder of the report (default: build/demo)")
     parser.add_argument("--build-folder", type=pathlib.Path, default=SOURCE / "build" / "release", help=argparse.SUPPRESS)
     parser.add_argument("--domain", type=int, help=argparse.SUPPRESS)  # tests: a DDS domain of their own
     # tests: "host" takes the programs of the build folder into the image instead of compiling them in it
     parser.add_argument("--container-programs", choices=("build", "host"), default="build", help=argparse.SUPPRESS)
     parser.add_argument("--free-ports", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
-    for name in ("plant", "part", "machine", "output", "build_folder"):
+    for name in ("plant", "part", "machine", "out", "build_folder"):
         setattr(options, name, getattr(options, name).resolve())
     for name in ("plant", "part", "machine"):
         if not getattr(options, name).is_file():
@@ -236,15 +236,15 @@ def main_job(run, processes, cell, console):
     cut_stage(run, cell, console, "identified", False, wish)
     cut_stage(run, cell, console, "identified and compensated", True, wish)
     run.resident_after = processes.resident_mib()
-    report.write(run, run.options.output)
+    report.write(run, run.options.out)
     console.say("\n" + report.table(run))
-    console.say(f"\nreport: {run.options.output / 'report.html'} and report.json beside it")
+    console.say(f"\nreport: {run.options.out / 'report.html'} and report.json beside it")
 
 
 def make_processes(options):
     import cell_processes
 
-    run_folder = options.output / "run"
+    run_folder = options.out / "run"
     if run_folder.exists():
         shutil.rmtree(run_folder)
     if options.containers:
@@ -306,7 +306,7 @@ def main():
     except Exception as error:  # the console is for people: one line, and where to look
         import stages
 
-        console.say(f"\nthe main job ended: {stages.explain(error)}\nlogs: {options.output / 'run'}")
+        console.say(f"\nthe main job ended: {stages.explain(error)}\nlogs: {options.out / 'run'}")
         return 1
     finally:
         if cell is not None:

@@ -20,7 +20,7 @@ class MainJob(unittest.TestCase):
         cls.folder = tempfile.TemporaryDirectory(prefix="lambdajet-main-job-")
         with under_test.private_domain() as domain:
             done = subprocess.run(
-                [sys.executable, str(MAIN_JOB), "--build-folder", str(BUILD), "--output", cls.folder.name, "--domain", str(domain),
+                [sys.executable, str(MAIN_JOB), "--build-folder", str(BUILD), "--out", cls.folder.name, "--domain", str(domain),
                  "--free-ports"],
                 stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=800, check=False)
         print(done.stdout.decode())
