@@ -110,8 +110,16 @@ absl::Status PredictFromFiles(const PredictFiles& files, Output& output) {
   if (!samples.ok()) {
     return samples.status();
   }
-  const ContourPrediction prediction =
-      accuracy::Predict(*machine, *samples, files.compensated, files.options);
+  accuracy::PredictionOptions options = files.options;
+  int drawn = 0;
+  options.cancelled = [&] {
+    if (drawn++ % std::max(1, options.draws / 100) == 0) {
+      output.Progress(static_cast<double>(drawn) / options.draws, "drawing machines");
+    }
+    return false;
+  };
+  const ContourPrediction prediction = accuracy::Predict(*machine, *samples, files.compensated, options);
+  output.EndProgress();
   if (prediction.reason != accuracy::PredictionReason::kPredicted) {
     output.Fail(ExitCode::kRefused, accuracy::Name(prediction.reason),
                 fmt::format("the plan cannot be predicted; line {} is to blame", prediction.blame_line));
