@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "tests/laws/trajectory_cases.hpp"
+#include "trajectory/core/feed/plan_program.hpp"
 #include "trajectory/core/part_program/gcode_reader.hpp"
 #include "trajectory/core/part_program/gcode_writer.hpp"
 
@@ -144,6 +145,27 @@ TEST(RightPrograms, StandStillForAnotherTool) {
   EXPECT_NEAR(kerf[1].y_W_mm, 10.0, kSame);
   EXPECT_NEAR(Done("G41\nG1 X9 F600\nG40 X0\nM2\n")[0].kerf_offset_mm, 0.4, kSame);
   EXPECT_NEAR(Done("G10 L1 P4 Z7\nT4 M6\nG43\nG0 Z1\nM2\n", kSixAxes)[1].z_W_mm, 8.0, kSame);
+}
+
+// The same gate as M0's, with the jet off before it.
+TEST(RightPrograms, AToolChangeIsAStopOfThePlan) {
+  const Plan plan = PlanPartProgram(
+                        "G21 G90\nT1 M6\nG0 X100 Y100\nM3\nG1 X120 F600\nT2 M6\nG0 X130\nM3\nG1 X140\nM5\n"
+                        "T2 M6\nM2\n",
+                        DemoLikeMachine(), {})
+                        .plan;
+  ASSERT_FALSE(plan.segments.empty());
+  std::vector<std::uint32_t> stops;
+  for (const Gate& gate : plan.gates) {
+    if (gate.kind == GateKind::kStop) {
+      stops.push_back(gate.source_line);
+    }
+  }
+  EXPECT_EQ(stops, (std::vector<std::uint32_t>{2, 6}));
+  EXPECT_EQ(plan.gates.size(), 4u);
+  EXPECT_EQ(std::count_if(plan.events.begin(), plan.events.end(),
+                          [](const ProcessEvent& e) { return e.action == ProcessAction::kJetOff; }),
+            2);
 }
 
 // Written and read again, nothing changes; a kerf that ends before the change ends there too.
