@@ -578,6 +578,47 @@ TEST(CldataLaw, PostsOfDifferentHabitsGiveTheSameOperations) {
   EXPECT_EQ(arc.line, 8u);  // the first of its points
 }
 
+std::vector<std::string> StopsAndSwitches(const PartProgram& program) {
+  std::vector<std::string> words;
+  for (const Operation& o : program.operations) {
+    const bool tool = o.kind == OperationKind::kToolChange || o.kind == OperationKind::kToolNumber;
+    if (tool || o.kind == OperationKind::kStop || o.kind == OperationKind::kJetOff) {
+      words.push_back(std::string(OperationName(o.kind)) +
+                      (tool ? " " + std::to_string(static_cast<int>(o.value)) : ""));
+    }
+  }
+  return words;
+}
+
+// The first LOADTL only names a tool, M6 always wants it mounted; any other tool stops, jet off, in both notations.
+TEST(CldataLaw, ToolsChangeAsWithMSix) {
+  const PartProgram cldata = ReadPartProgram(
+      "PARTNO/1\nFROM/10,10,0\nLOADTL/4\nSPINDL/ON\nFEDRAT/600,MMPM\nGOTO/20,10,0\nLOADTL/4\nLOADTL/7\n"
+      "RAPID\nGOTO/20,20,0\nSPINDL/ON\nGOTO/30,20,0\nFINI\n",
+      {});
+  ASSERT_TRUE(cldata.faults.empty()) << cldata.faults[0].message;
+  EXPECT_EQ(StopsAndSwitches(cldata),
+            (std::vector<std::string>{"TOOL_NUMBER 4", "JET_OFF", "TOOL_CHANGE 7", "JET_OFF"}));
+  const PartProgram gcode =
+      ReadPartProgram("G21 G90\nT4 M6\nG0 X10 Y10\nM3\nG1 X20 F600\nT7 M6\nG0 X30\nM3\nG1 X40\nM2\n", {});
+  ASSERT_TRUE(gcode.faults.empty()) << gcode.faults[0].message;
+  EXPECT_EQ(StopsAndSwitches(gcode),
+            (std::vector<std::string>{"TOOL_CHANGE 4", "JET_OFF", "TOOL_CHANGE 7", "JET_OFF"}));
+  for (const PartProgram& program : {cldata, gcode}) {
+    const CldataText once = WriteCldata(program.operations, "part");
+    ASSERT_TRUE(once.faults.empty());
+    const PartProgram again = ReadPartProgram(once.text, {});
+    ASSERT_TRUE(again.faults.empty());
+    EXPECT_EQ(WriteCldata(again.operations, "part").text, once.text);
+    std::vector<std::string> words = StopsAndSwitches(program);
+    if (words[0] == "TOOL_CHANGE 4") {
+      words.erase(words.begin());
+      words.insert(words.begin(), {"STOP", "TOOL_NUMBER 4"});
+    }
+    EXPECT_EQ(StopsAndSwitches(again), words);
+  }
+}
+
 TEST(CldataLaw, InverseTimeFeedGivesEveryMoveItsTime) {
   const PartProgram p =
       ReadCldata("FROM/0,0,0\nFEDRAT/60,INVERS\nGOTO/3,4,0\nGOTO/3,14,0\nGOTO/3,14,0\nFINI\n");

@@ -133,6 +133,7 @@ bool CldataReading::Tolerance() {
   return true;
 }
 
+// The first one, before anything is cut, names the tool that the job begins with; another is mounted by hand, as with M6.
 bool CldataReading::LoadTool() {
   if (!Count(1, kMostParameters)) {
     return false;
@@ -141,10 +142,31 @@ bool CldataReading::LoadTool() {
   if (!tool.is_number) {
     return Fault(tool.place, "TOOL_NUMBER_MISSING", "a tool is named by its number");
   }
-  if (tool_ && *tool_ != tool.value) {
-    return Fault(tool.place, "TOOL_CHANGE", "this machine has one tool; split the program");
+  if (!IsTool(tool.value)) {
+    return Fault(tool.place, "TOOL_NUMBER_OUT_OF_RANGE", "a tool's number is whole, 0 to 99999");
   }
-  tool_ = tool.value;
+  if (tool_ == tool.value) {
+    return true;
+  }
+  return !tool_ && !cut_ ? NameTool(tool.value) : ChangeTool(tool.value);
+}
+
+bool CldataReading::NameTool(double number) {
+  tool_ = number;
+  Add(OperationKind::kToolNumber)->value = number;
+  return true;
+}
+
+bool CldataReading::ChangeTool(double number) {
+  if (kerf_offset_mm_ != 0.0) {
+    return Fault(statement_.place, "NOT_WITH_KERF_ON", "TLCOMP/OFF must stand before");
+  }
+  if (jet_on_) {
+    JetOff();
+  }
+  Turn(true, 0.0);
+  tool_ = number;
+  Add(OperationKind::kToolChange)->value = number;
   return true;
 }
 

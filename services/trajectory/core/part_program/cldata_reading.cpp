@@ -42,6 +42,7 @@ Operation& CldataReading::Move(OperationKind kind, const Vector& target) {
   position_ = target;
   stands_ = axis_;
   moved_ = true;
+  cut_ = cut_ || kind != OperationKind::kTraverse;
   Operation* o = Add(kind);
   o->kerf_offset_mm = kerf_offset_mm_;
   return *o;

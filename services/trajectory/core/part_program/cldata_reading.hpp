@@ -67,6 +67,8 @@ class CldataReading {
   bool Multax();
   bool Tolerance();
   bool LoadTool();
+  bool NameTool(double number);
+  bool ChangeTool(double number);
 
   // ---- switches: cldata_switches.cpp ----
   bool Spindle();
@@ -134,7 +136,7 @@ class CldataReading {
   CldataLines lines_;
   PartProgram program_;
   CldataStatement statement_;
-  bool anything_ = false, moved_ = false, ended_ = false, finished_ = false, stopped_ = false;
+  bool anything_ = false, moved_ = false, cut_ = false, ended_ = false, finished_ = false, stopped_ = false;
 
   Vector position_{};
   Vector axis_{0.0, 0.0, 1.0};

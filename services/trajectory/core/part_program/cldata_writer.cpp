@@ -175,9 +175,27 @@ class Writer {
       case OperationKind::kCoolantOff:
         Line("COOLNT/OFF");
         break;
+      case OperationKind::kToolChange:
+      case OperationKind::kToolNumber:
+        Tool(o);
+        break;
       default:
         Fault(o, "NOT_WRITABLE", "CLDATA has no word for this operation");
     }
+  }
+
+  // The first LOADTL before all cuts only names a tool: where it is to be mounted, STOP stands before it.
+  void Tool(const Operation& o) {
+    const bool only_names = !tool_named_ && !cut_;
+    if (o.kind == OperationKind::kToolNumber && !only_names) {
+      Fault(o, "NOT_WRITABLE", "CLDATA names the mounted tool before the first cut only");
+      return;
+    }
+    if (o.kind == OperationKind::kToolChange && only_names) {
+      Line("STOP");
+    }
+    Line("LOADTL/" + Exact(o.value));
+    tool_named_ = true;
   }
 
   void SetFeed(double feed_mm_per_s) {
@@ -222,6 +240,7 @@ class Writer {
     }
     const Vector end = {o.x_W_mm, o.y_W_mm, o.z_W_mm};
     const bool cuts = o.kind != OperationKind::kTraverse;
+    cut_ = cut_ || cuts;
     if (cuts && o.value > 0.0) {  // before the side of the path, where a feed that is read stands
       SetDuration(o.value);
     } else if (cuts) {
@@ -289,6 +308,7 @@ class Writer {
   CldataText result_;
   ToolAngles tool_angles_;
   bool multax_ = false;
+  bool tool_named_ = false, cut_ = false;
   Vector position_{};
   std::string feed_;
   double kerf_mm_ = 0.0;

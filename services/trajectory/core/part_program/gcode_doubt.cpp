@@ -72,7 +72,6 @@ const Row* RowOf(std::string_view reason) {
 
 constexpr double kSlowestFeed = 1e-6;
 constexpr double kFastestFeed = 1e9;
-constexpr double kLargestTool = 99999.0;
 
 // What the words of a line that was not obeyed say of the state behind it.
 class Meaning {
@@ -93,7 +92,7 @@ class Meaning {
     Feed();
     Place();
     r_.doubt |= Lost('S', kSpeedDoubt) | Lost('T', kToolDoubt);
-    if (r_.block.has('T') && r_.block.at('T') >= 0.0 && r_.block.at('T') <= kLargestTool) {
+    if (r_.block.has('T') && IsTool(r_.block.at('T'))) {
       s_.selected_tool = static_cast<int>(r_.block.at('T'));
     }
     r_.doubt |= s_.motion == 50 ? kSplineDoubt : 0u;

@@ -1,14 +1,8 @@
 // T, M6 and M61 of a machine whose tool is changed by hand: T selects, M6 stands still until another tool is mounted.
-#include <cmath>
-
 #include "trajectory/core/part_program/gcode_reading.hpp"
 
 namespace lambdajet::trajectory {
 namespace {
-
-constexpr double kLargestTool = 99999.0;
-
-bool IsTool(double number) { return number >= 0.0 && number <= kLargestTool && number == std::floor(number); }
 
 bool SelectTool(Reading& r) {
   if (!r.block.has('T')) {

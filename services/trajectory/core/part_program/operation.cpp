@@ -1,6 +1,7 @@
 #include "trajectory/core/part_program/operation.hpp"
 
 #include <array>
+#include <cmath>
 #include <cstdio>
 
 namespace lambdajet::trajectory {
@@ -115,6 +116,11 @@ void AppendOneNumber(std::string& text, const Operation& o) {
 }
 
 }  // namespace
+
+bool IsTool(double number) {
+  constexpr double kLargest = 99999.0;
+  return number >= 0.0 && number <= kLargest && number == std::floor(number);
+}
 
 std::string_view OperationName(OperationKind kind) { return kNames[static_cast<std::size_t>(kind)]; }
 

@@ -48,6 +48,9 @@ enum class OperationKind : std::uint8_t {
 // UPPER_SNAKE.
 std::string_view OperationName(OperationKind kind);
 
+// Whole, 0 … 99999; 0 is no tool.
+bool IsTool(double number);
+
 // Far beyond every machine; every notation can write what is below it and read it again.
 inline constexpr double kFastestFeed_mm_per_s = 1e7;
 
