@@ -3,11 +3,13 @@
 
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
 #include <fstream>
 #include <iterator>
 #include <string>
 
-#include "tests/laws/trajectory_spatial_cases.hpp"
+#include "kinematics/core/hexapod_singularity.hpp"
+#include "tests/laws/trajectory_spatial_hostile.hpp"
 #include "tests/laws/trajectory_spatial_reference.hpp"
 #include "trajectory/core/feed/binding.hpp"
 #include "trajectory/core/part_program/cldata_writer.hpp"
@@ -125,8 +127,8 @@ void SampleLimits(const SpatialPlan& plan, const HexapodMotion& m, Worst& worst)
 
 // Plays the struts through the forward kinematics; path acceleration, way back to the planned pose, and tolerance.
 void PlayForward(const PlannedSpatialProgram& planned, const std::vector<Block>& blocks, double step_s,
-                 Worst& worst) {
-  const StrutMotion machine(WorkedHexapod(), WorkedMotion().X_MT_zero);
+                 Worst& worst, const HexapodGeometry& geometry = WorkedHexapod()) {
+  const StrutMotion machine(geometry, WorkedMotion().X_MT_zero);
   Pose X_MP = machine.PlatformAt(planned.samples.front().p_W_mm, planned.samples.front().q_W);
   std::size_t at = 0;
   for (double tau = 0.0; tau < planned.plan.duration_s; tau += step_s) {
@@ -153,6 +155,10 @@ void PlayForward(const PlannedSpatialProgram& planned, const std::vector<Block>&
           at = i - 4;
         }
       }
+    }
+    for (std::size_t i = 0; i < blocks.size() && nearest > 1.0;
+         ++i) {  // a place that is visited again led astray
+      nearest = std::min(nearest, blocks[i].Nearest(tool.p_mm, q));
     }
     worst.ratio = std::max(worst.ratio, nearest);
   }
@@ -194,6 +200,164 @@ TEST(SpatialPlan, KeepsEveryLimitAndBothTolerancesOnRandomPrograms) {
   EXPECT_LE(worst.ratio, 1.0);
   EXPECT_LE(worst.forward_mm, 1e-3);
   EXPECT_LE(worst.forward_rad, 1e-5);
+}
+
+// LAMBDAJET_RANDOM_PROGRAMS: how many hostile programs of every kind, or FIRST-LAST; more of them than CI's slice are larger, too.
+struct HostileSeeds {
+  std::uint64_t first = 1, last = 3;
+  int size = 5;
+};
+
+HostileSeeds WantedHostileSeeds() {
+  HostileSeeds seeds;
+  if (const char* wanted = std::getenv("LAMBDAJET_RANDOM_PROGRAMS"); wanted != nullptr) {
+    unsigned first = 0, last = 0;
+    const int numbers = std::sscanf(wanted, "%u-%u", &first, &last);
+    seeds = numbers == 2 ? HostileSeeds{first, last, 12} : HostileSeeds{1, first, 12};
+  }
+  return seeds;
+}
+
+// Of the machine with its limits tighter by as much as a plan may leave the programmed poses.
+HexapodGeometry Tightened(HexapodGeometry g) {
+  g.limits.strut_min_mm += 0.2, g.limits.strut_max_mm -= 0.2;
+  g.limits.base_cone_rad -= 2e-3, g.limits.platform_cone_rad -= 2e-3;
+  g.limits.singular_margin += 2e-3;
+  return g;
+}
+
+// The first line whose programmed poses the machine cannot hold; 0: it can hold all.
+std::uint32_t FirstLineOutOfReach(const std::vector<Operation>& operations, const HexapodGeometry& geometry) {
+  const StrutMotion machine(geometry, WorkedMotion().X_MT_zero);
+  for (const Block& block : BlocksOf(operations)) {
+    constexpr int kChecks = 300;
+    for (int i = 0; i <= kChecks; ++i) {
+      const double u = i / static_cast<double>(kChecks);
+      ProgramFault fault;
+      if (!machine.Reaches(block.TipAt(u), block.TurnAt(u), block.to.line, fault)) {
+        return block.to.line;
+      }
+    }
+  }
+  return 0;
+}
+
+void ExpectHeld(const PlannedSpatialProgram& planned, const std::vector<Operation>& operations,
+                const HexapodMotion& motion, const HexapodGeometry& geometry, Worst& worst) {
+  Worst own;
+  SampleLimits(planned.plan, motion, own);
+  PlayForward(planned, BlocksOf(operations), std::max(0.01, planned.plan.duration_s / 4000.0), own, geometry);
+  EXPECT_LE(own.velocity, 1.0 + 1e-6);
+  EXPECT_LE(own.acceleration, 1.0 + 1e-6);
+  EXPECT_LE(own.jerk, 1.0 + 1e-6);
+  EXPECT_LE(own.path_acceleration, 1.0 + 1e-6);
+  EXPECT_LE(own.ratio, 1.0);
+  for (double Worst::*share :
+       {&Worst::velocity, &Worst::acceleration, &Worst::jerk, &Worst::path_acceleration, &Worst::ratio}) {
+    worst.*share = std::max(worst.*share, own.*share);
+  }
+}
+
+// What lies in reach gets a plan that holds every limit; what does not is refused with the line and the place.
+TEST(SpatialPlan, HostileProgramsAreHeldOrRefusedByLineAndPlace) {
+  const HostileSeeds seeds = WantedHostileSeeds();
+  int all_refused = 0;
+  for (std::size_t kind = 0; kind < kHostileNames.size(); ++kind) {
+    Worst worst;
+    int held = 0, refused = 0;
+    double moving_s = 0.0;
+    for (std::uint64_t seed = seeds.first; seed <= seeds.last; ++seed) {
+      SCOPED_TRACE(std::string(kHostileNames[kind]) + ", seed " + std::to_string(seed));
+      HostileSpatialProgram program(static_cast<Hostile>(kind), seed);
+      const std::vector<Operation> operations =
+          program.Draw(static_cast<Hostile>(kind) == Hostile::kOneBlock ? 1 : seeds.size);
+      const HexapodGeometry geometry = program.geometry();
+      const HexapodMotion motion = seed % 2 == 0 ? LameStruts() : WorkedMotion();
+      const PlannedSpatialProgram planned = PlanSpatialProgram(operations, "worked", geometry, motion, {});
+      const std::uint32_t line = FirstLineOutOfReach(operations, geometry);
+      if (planned.faults.empty()) {
+        EXPECT_EQ(line, 0u) << "is planned through what cannot be held";
+        ExpectHeld(planned, operations, motion, geometry, worst);
+        moving_s += planned.plan.duration_s;
+        ++held;
+      } else {
+        EXPECT_NE(FirstLineOutOfReach(operations, Tightened(geometry)), 0u) << FaultText(planned);
+        EXPECT_TRUE(planned.plan.segments.empty());
+        EXPECT_TRUE(line == 0 || planned.faults[0].line == line) << line << ": " << FaultText(planned);
+        EXPECT_THAT(planned.faults[0].message, testing::HasSubstr("cannot hold the tool at X"));
+        EXPECT_THAT(std::string(planned.faults[0].reason),
+                    testing::AnyOf("ACTUATOR_LIMIT", "JOINT_LIMIT", "SINGULAR", "OUT_OF_REACH"));
+        ++refused;
+      }
+    }
+    std::printf("%s: %d held (%.0f s), %d refused; of limits %.6f %.6f %.6f, path %.6f, of tolerance %.4f\n",
+                kHostileNames[kind], held, moving_s, refused, worst.velocity, worst.acceleration, worst.jerk,
+                worst.path_acceleration, worst.ratio);
+    std::fflush(stdout);
+    EXPECT_GT(held, 0) << kHostileNames[kind];
+    all_refused += refused;
+  }
+  EXPECT_GT(all_refused, 0);
+}
+
+// A cut whose ends can both be held by wide joints turns the platform through its singular place.
+TEST(SpatialPlan, ASingularPlaceWithinACutIsRefusedThere) {
+  HexapodGeometry wide = WideHexapod();
+  const std::vector<Operation> operations = {
+      SpatialMove(OperationKind::kTraverse, {0, 0, 20}, {0, 0, 0}, 0, 3),
+      SpatialMove(OperationKind::kFeedLine, {20, 0, 20}, {0, 0, 0.2}, 50, 4),
+      SpatialMove(OperationKind::kFeedLine, {20, 10, 20}, {0, 0, 1.9}, 50, 5),
+      SpatialMove(OperationKind::kFeedLine, {0, 10, 20}, {0, 0, 1.9}, 50, 6)};
+  for (const double margin : {0.15, 0.0}) {
+    SCOPED_TRACE(margin);
+    wide.limits.singular_margin = margin;
+    const PlannedSpatialProgram planned = PlanSpatialProgram(operations, "wide", wide, WorkedMotion(), {});
+    ASSERT_FALSE(planned.faults.empty());
+    EXPECT_TRUE(planned.plan.segments.empty());
+    EXPECT_EQ(planned.faults[0].line, 5u);
+    EXPECT_EQ(planned.faults[0].reason, "SINGULAR");
+    EXPECT_THAT(planned.faults[0].message, testing::HasSubstr("SINGULAR_MARGIN"));
+    // The place, to a node: where the margin of the poses along the block runs out.
+    const StrutMotion machine(wide, WorkedMotion().X_MT_zero);
+    const Block block{operations[1], operations[2], 0.02};
+    double in = 0.0, out = 1.0;
+    for (int i = 0; i < 50; ++i) {
+      const double u = 0.5 * (in + out);
+      const double left = kinematics::AnalyseSingularity(machine.hexapod(),
+                                                         machine.PlatformAt(block.TipAt(u), block.TurnAt(u)))
+                              .signed_margin -
+                          margin;
+      (left > 0.0 ? in : out) = u;
+    }
+    double y = 0.0, c = 0.0;
+    const char* at = std::strstr(planned.faults[0].message.c_str(), " Y");
+    ASSERT_NE(at, nullptr);
+    ASSERT_EQ(std::sscanf(at, " Y%lf", &y), 1);
+    at = std::strstr(at, " C");
+    ASSERT_EQ(std::sscanf(at, " C%lf", &c), 1);
+    EXPECT_NEAR(y, 10.0 * in, 0.05);
+    EXPECT_NEAR(c, (0.2 + 1.7 * in) * 180.0 / std::numbers::pi, 0.4);
+  }
+}
+
+// No machine cuts for as long as this feed asks, and no plan that long is laid out.
+TEST(SpatialPlan, AFeedThatNeverEndsIsRefusedAtItsLine) {
+  const std::vector<Operation> slow = {
+      SpatialMove(OperationKind::kTraverse, {-50, 0, 20}, {0, 0, 0}, 0, 1),
+      SpatialMove(OperationKind::kFeedLine, {50, 0, 20}, {0, 0, 0}, 50, 2),
+      SpatialMove(OperationKind::kFeedLine, {50, 40, 20}, {0, 0, 0}, 1e-4, 3),
+      SpatialMove(OperationKind::kFeedLine, {0, 40, 20}, {0, 0, 0}, 50, 4)};
+  const PlannedSpatialProgram planned = PlanOf(slow);
+  ASSERT_EQ(planned.faults.size(), 1u);
+  EXPECT_EQ(planned.faults[0].line, 3u);
+  EXPECT_EQ(planned.faults[0].reason, "PLAN_TOO_LONG");
+  EXPECT_TRUE(planned.plan.segments.empty());
+  Operation helix = SpatialMove(OperationKind::kFeedArc, {10, 0, 20}, {0, 0, 0}, 20, 2);
+  helix.sweep_rad = 1e6;
+  EXPECT_EQ(PlanOf({SpatialMove(OperationKind::kTraverse, {10, 0, 20}, {0, 0, 0}, 0, 1), helix})
+                .faults.at(0)
+                .reason,
+            "PLAN_TOO_LONG");
 }
 
 // The plain reference on every block, with the limits themselves; every corner exact, jerk without limit.

@@ -9,6 +9,7 @@
 #include <random>
 #include <vector>
 
+#include "tests/laws/trajectory_cases.hpp"
 #include "trajectory/core/feed/binding.hpp"
 #include "trajectory/core/feed/corner_speed.hpp"
 #include "trajectory/core/feed/level_tops.hpp"
@@ -380,6 +381,56 @@ TEST(BindingReport, LimitingCases) {
   EXPECT_EQ(apart[1].reached_share, 0.6);
   EXPECT_EQ(apart[1].from_s_mm, 7.0);
   EXPECT_EQ(apart[1].to_s_mm, 8.0);
+}
+
+// ---- singular places within a cut
+
+// Both ends of the cut can be held; the lambda mechanism is singular with the jet on its rail, and where its main link stands
+// square to it.
+TEST(ReachFault, ASingularPlaceWithinACutIsRefusedThere) {
+  struct Case {
+    const char* text;
+    double x, y, i, j;  // the arc's begin and centre from it
+    double sheet_y_mm;
+  };
+  for (const Case& c :
+       {Case{"G0 X100 Y860\nM3\nG2 X300 Y860 I100 J-151.666667 F1200\nM5\nM2\n", 100, 860, 100, -151.666667,
+             100.1},
+        Case{"G0 X100 Y35\nM3\nG3 X300 Y35 I100 J235 F1200\nM5\nM2\n", 100, 35, 100, 235, -199.9}}) {
+    MachineDescription machine = DemoLikeMachine();
+    machine.sheet_height_mm = 950.0;  // over the rail
+    machine.value(Parameter::kSheetYMm) = c.sheet_y_mm;
+    const auto mechanism = kinematics::LambdaMechanism::FromDescription(machine);
+    const auto reason_at = [&](double x, double y) {
+      return kinematics::SolveInverse(
+                 mechanism, machine.X_DJ().translation_mm() - machine.X_EW() * Eigen::Vector2d(x, y))
+          .reason;
+    };
+    SCOPED_TRACE(c.text);
+    ASSERT_EQ(reason_at(100, c.y), kinematics::Reason::kSolved);
+    ASSERT_EQ(reason_at(300, c.y), kinematics::Reason::kSolved);
+    const PlannedProgram planned = PlanPartProgram(c.text, machine, {});
+    ASSERT_FALSE(planned.faults.empty());
+    EXPECT_TRUE(planned.plan.segments.empty());
+    EXPECT_EQ(planned.faults[0].line, 3u);
+    EXPECT_EQ(planned.faults[0].reason, "SINGULAR") << planned.faults[0].message;
+    double x = 0.0, y = 0.0;
+    const std::size_t at = planned.faults[0].message.find("at X");
+    ASSERT_NE(at, std::string::npos) << planned.faults[0].message;
+    ASSERT_EQ(std::sscanf(planned.faults[0].message.c_str() + at, "at X%lf Y%lf", &x, &y), 2);
+    EXPECT_EQ(reason_at(x, y), kinematics::Reason::kSingular);
+    EXPECT_NEAR(std::hypot(x - c.x - c.i, y - c.y - c.j), std::hypot(c.i, c.j), 0.01) << "not on the arc";
+    // It is the first such place, to the grid's millimetre or so.
+    double nearest_x = 100.0;
+    for (; nearest_x < 300.0; nearest_x += 0.05) {
+      const double up = std::sqrt(c.i * c.i + c.j * c.j - std::pow(nearest_x - c.x - c.i, 2));
+      if (reason_at(nearest_x, c.y + c.j + (c.j < 0.0 ? up : -up)) != kinematics::Reason::kSolved) {
+        break;
+      }
+    }
+    EXPECT_NEAR(x, nearest_x, 2.0);
+    EXPECT_EQ(AdmitPartProgram(c.text, machine, {}).faults.at(0).reason, "SINGULAR");
+  }
 }
 
 }  // namespace

@@ -26,16 +26,29 @@ SpatialDraft::SpatialDraft(const SpatialModel& model, const SpatialRun& run, dou
   pace_.Reset(nodes_.size());
 }
 
-void SpatialDraft::Move() {
+bool SpatialDraft::Move() {
   SetSpeeds();
+  if (!(node_time_s_.back() <= kLongestRun_s)) {
+    return false;
+  }
   SampleTime();
   SmoothKnots();
+  return true;
 }
 
-std::uint32_t SpatialDraft::Slow(std::span<const SlowPlace> places, double widening) {
+double SpatialDraft::SlowestOffset_mm() const {
+  std::size_t slowest = 0;
+  const auto lasts = [&](std::size_t k) { return node_time_s_[k + 1] - node_time_s_[k]; };
+  for (std::size_t k = 0; k + 1 < node_time_s_.size(); ++k) {
+    slowest = lasts(k) > lasts(slowest) ? k : slowest;
+  }
+  return nodes_[slowest].offset_mm;
+}
+
+double SpatialDraft::Slow(std::span<const SlowPlace> places, double widening) {
   const std::ptrdiff_t last =
       pace_.Slow(places, widening * model_.filter.half_support_s(), 0.0, node_time_s_);
-  return PieceAt(last < 0 ? 0.0 : nodes_[static_cast<std::size_t>(last)].offset_mm).line;
+  return last < 0 ? 0.0 : nodes_[static_cast<std::size_t>(last)].offset_mm;
 }
 
 const SpatialPiece& SpatialDraft::PieceAt(double offset_mm) const {

@@ -13,16 +13,22 @@
 
 namespace lambdajet::trajectory {
 
+// A knot takes some 450 bytes while its run is planned.
+inline constexpr double kLongestRun_s = 7200.0;
+
 class SpatialDraft {
  public:
   // `run` with at least one piece; what the machine cannot reach becomes a fault.
   SpatialDraft(const SpatialModel& model, const SpatialRun& run, double begin_s_mm,
                std::vector<ProgramFault>& faults);
 
-  // Speeds under the pace, samples a knot apart, and the smoothed knots.
-  void Move();
-  // Slows the nodes about these places; answers a line that is slowed.
-  std::uint32_t Slow(std::span<const SlowPlace> places, double widening);
+  // Speeds under the pace, samples a knot apart, and the smoothed knots. False, and nothing laid out, where that would last
+  // longer than kLongestRun_s.
+  bool Move();
+  // The offset at which most of the time is spent.
+  double SlowestOffset_mm() const;
+  // Slows the nodes about these places; answers the last offset that is slowed.
+  double Slow(std::span<const SlowPlace> places, double widening);
 
   const SpatialModel& model() const { return model_; }
   const SpatialRun& run() const { return run_; }

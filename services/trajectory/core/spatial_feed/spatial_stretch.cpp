@@ -1,6 +1,7 @@
 #include "trajectory/core/spatial_feed/spatial_stretch.hpp"
 
 #include <algorithm>
+#include <cstdio>
 
 #include "trajectory/core/feed/quintic.hpp"
 #include "trajectory/core/spatial_feed/pose_check.hpp"
@@ -28,16 +29,17 @@ class StretchPlanner {
 
   SpatialStretchPlan Plan() {
     for (int pass = 0; plan_.faults.empty(); ++pass) {
-      draft_.Move();
+      if (!draft_.Move()) {
+        NotHeld(draft_.SlowestOffset_mm());
+        break;
+      }
       MakeSegments();
       if (!plan_.faults.empty() || !Exceeded()) {
         break;
       }
-      const std::uint32_t line = draft_.Slow(exceeded_, 1.0 + pass / 6.0);
+      const double offset_mm = draft_.Slow(exceeded_, 1.0 + pass / 6.0);
       if (pass + 1 == kMostPasses) {
-        plan_.faults.push_back(
-            {line, 0, "LIMITS_NOT_HELD", "",
-             "no speed was found at which every limit is held here; the contour is too tight"});
+        NotHeld(offset_mm);
       }
     }
     if (plan_.faults.empty()) {
@@ -49,6 +51,17 @@ class StretchPlanner {
   }
 
  private:
+  void NotHeld(double offset_mm) {
+    const SpatialPiece& piece = draft_.PieceAt(offset_mm);
+    const Eigen::Vector3d p = PointOn(piece, offset_mm - piece.begin_mm).p_mm;
+    char text[160];
+    std::snprintf(text, sizeof text,
+                  "no speed was found at which every limit is held at X%.3f Y%.3f Z%.3f; the contour is too "
+                  "tight there",
+                  p.x(), p.y(), p.z());
+    plan_.faults.push_back({piece.line, 0, "LIMITS_NOT_HELD", "", text});
+  }
+
   // ---- segments ----
 
   KnotEnds EndsAt(const SpatialKnot& knot) {

@@ -1,5 +1,6 @@
 #include "trajectory/core/spatial_feed/strut_motion.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 
@@ -19,13 +20,24 @@ const char* UnitOf(kinematics::HexapodBound bound) {
                                                                               : "rad";
 }
 
+constexpr double kLeastMargin = 1e-6;
+
+// A description may leave out the margin; through a singular place nothing is driven.
+HexapodGeometry WithMargin(HexapodGeometry geometry) {
+  geometry.limits.singular_margin = std::max(geometry.limits.singular_margin, kLeastMargin);
+  return geometry;
+}
+
 // W against the tool as it stands at A0 B0 C0; its own inverse.
 Eigen::Matrix3d HalfTurn() { return Eigen::Vector3d(1, -1, -1).asDiagonal(); }
 
 }  // namespace
 
 StrutMotion::StrutMotion(const HexapodGeometry& geometry, const Pose& X_MT_zero)
-    : hexapod_(geometry), X_MW_{X_MT_zero.p_mm, X_MT_zero.R * HalfTurn()}, X_TP_(geometry.X_PT.Inverse()) {}
+
+    : hexapod_(WithMargin(geometry)),
+      X_MW_{X_MT_zero.p_mm, X_MT_zero.R * HalfTurn()},
+      X_TP_(geometry.X_PT.Inverse()) {}
 
 Pose StrutMotion::PlatformAt(const Eigen::Vector3d& p_W_mm, const Eigen::Quaterniond& q_W) const {
   return X_MW_ * Pose{p_W_mm, q_W.toRotationMatrix() * HalfTurn()} * X_TP_;
