@@ -10,7 +10,15 @@ using Eigen::Vector2d;
 constexpr double kCornerCosine = 0.995;  // kinks above 0.1 rad are corners
 constexpr double kCornerLook_mm = 2.0;
 constexpr double kPieceLook_mm = 1.0;
+constexpr double kMetShare = 0.9;   // of the tolerance: so near, a place is met
+constexpr int kChords = 8;          // a segment
 constexpr double kNoMatter = 0.02;  // of the tolerance: so near, neighbours are not asked
+
+double ToChord(const Vector2d& p, const Vector2d& a, const Vector2d& b) {
+  const Vector2d d = b - a, r = p - a;
+  const double share = d.squaredNorm() > 0.0 ? std::clamp(r.dot(d) / d.squaredNorm(), 0.0, 1.0) : 0.0;
+  return (r - share * d).norm();
+}
 
 }  // namespace
 
@@ -31,8 +39,8 @@ void ContourCheck::FindCorners() {
       const PathPoint here = PointOn(pieces[k], 0.0);
       if (u.dot(here.tangent) < kCornerCosine) {
         const double s_mm = begin_s_mm + pieces[k].begin_mm;
-        corners_.push_back(
-            {here.p_mm, s_mm, std::min(s_mm + kCornerLook_mm, end_s_mm), pieces[k].tolerance_mm});
+        corners_.push_back({here.p_mm, s_mm, std::min(s_mm + kCornerLook_mm, end_s_mm),
+                            std::min(pieces[k - 1].tolerance_mm, pieces[k].tolerance_mm)});
       }
     }
     if (!pieces.empty() && draft_.FlowsOn(i)) {  // the end of a cut that is left at speed
@@ -46,14 +54,11 @@ void ContourCheck::NearCorners(double s_mm, const Vector2d& a, const Vector2d& b
   while (corner_at_ < corners_.size() && corners_[corner_at_].s_mm < s_mm - kCornerLook_mm) {
     ++corner_at_;
   }
-  const Vector2d d = b - a;
   for (std::size_t i = corner_at_; i < corners_.size() && corners_[i].s_mm <= s_mm + kCornerLook_mm; ++i) {
     if (s_mm > corners_[i].last_s_mm) {
       continue;
     }
-    const Vector2d r = corners_[i].p_mm - a;
-    const double share = d.squaredNorm() > 0.0 ? std::clamp(r.dot(d) / d.squaredNorm(), 0.0, 1.0) : 0.0;
-    const double distance = (r - share * d).norm();
+    const double distance = ToChord(corners_[i].p_mm, a, b);
     if (distance < corners_[i].nearest_mm) {
       corners_[i].nearest_mm = distance;
       corners_[i].time_s = time_s;
@@ -90,14 +95,45 @@ double ContourCheck::Deviation(const Vector2d& p_mm, double s_mm, double exact_f
   if (distance <= std::min(std::max(largest_mm_, kNoMatter * tolerance_mm), exact_from * tolerance_mm)) {
     return distance;
   }
+  const auto take =
+      [&](const PathPiece& piece) {  // the piece that is left by the least share of its tolerance
+        const double other = DistanceTo(piece, p_mm);
+        if (other * tolerance_mm < distance * piece.tolerance_mm) {
+          distance = other;
+          tolerance_mm = piece.tolerance_mm;
+        }
+      };
   for (std::size_t i = piece_at_;
        i-- > 0 && offset - (pieces[i].begin_mm + pieces[i].length_mm) < kPieceLook_mm;) {
-    distance = std::min(distance, DistanceTo(pieces[i], p_mm));
+    take(pieces[i]);
   }
   for (std::size_t i = piece_at_ + 1; i < pieces.size() && pieces[i].begin_mm - offset < kPieceLook_mm; ++i) {
-    distance = std::min(distance, DistanceTo(pieces[i], p_mm));
+    take(pieces[i]);
   }
   return distance;
+}
+
+double ContourCheck::Missed(const Vector2d& p_mm, double s_mm, double time_s, double look_s) const {
+  const PathPiece& here = piece();
+  const double enough = kMetShare * here.tolerance_mm;
+  const Vector2d place = PointOn(here, s_mm - draft_.planned[run_at_].begin_s_mm - here.begin_mm).p_mm;
+  double nearest = (p_mm - place).norm();
+  const double apart_s = draft_.segment_s() / kChords;
+  const double end_s = draft_.segment_s() * static_cast<double>(draft_.played.size());
+  Vector2d before = p_mm, behind = p_mm;
+  for (double away = apart_s; nearest > enough && away <= look_s; away += apart_s) {
+    const Vector2d earlier = PlayedAt(std::max(0.0, time_s - away)),
+                   later = PlayedAt(std::min(end_s, time_s + away));
+    nearest = std::min({nearest, ToChord(place, before, earlier), ToChord(place, behind, later)});
+    before = earlier;
+    behind = later;
+  }
+  return nearest;
+}
+
+Vector2d ContourCheck::PlayedAt(double time_s) const {
+  const auto n = std::min(draft_.played.size() - 1, static_cast<std::size_t>(time_s / draft_.segment_s()));
+  return draft_.played[n].value(time_s - static_cast<double>(n) * draft_.segment_s());
 }
 
 }  // namespace lambdajet::trajectory

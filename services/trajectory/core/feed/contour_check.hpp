@@ -1,8 +1,9 @@
 // Measures how far a planned stretch lies from its programmed contour, and how near it comes to the contour's corners.
 //
-// Model: the distance of each planned point from the pieces of its own run about the same path length; and of each corner from
-// the chords of planned points about it, because a plan that turns back on itself may stay on the contour and yet miss its
-// corner. A corner is met by its own cut only; the end of a cut that is left at speed may be met just behind it.
+// Model: the distance of each planned point from the pieces of its own run about the same path length, each in shares of its
+// own tolerance; of each corner from the chords of planned points about it, because a plan that turns back on itself may stay
+// on the contour and yet miss its corner; and of the contour's places from those chords, because a plan may cut across an arc
+// that is smaller than the smoothing is long and yet lie near its neighbours. A corner is met by its own cut only; the end of a cut that is left at speed may be met just behind it.
 // Frames: W. Units: mm, s. Threads: one object a thread; points in path order. Cost: O(1) a point, near kinks of the pieces
 // within a millimetre.
 #pragma once
@@ -40,6 +41,9 @@ class ContourCheck {
   // Distance of the planned point from the programmed contour, with the contour's tolerance there; negative outside of runs. It
   // may be told too large where it is below `exact_from` of the tolerance and of the largest kept so far.
   double Deviation(const Eigen::Vector2d& p_mm, double s_mm, double exact_from, double& tolerance_mm);
+  // Distance of the contour's place at this path length, in the run and piece moved to, from what is played within `look_s` of
+  // the moment at which the plan is at p; `time_s` counts from the first segment. It may be told too large where it is small.
+  double Missed(const Eigen::Vector2d& p_mm, double s_mm, double time_s, double look_s) const;
   // Keeps it for the largest.
   void Keep(double deviation_mm) { largest_mm_ = std::max(largest_mm_, deviation_mm); }
   double largest_mm() const { return largest_mm_; }
@@ -50,6 +54,7 @@ class ContourCheck {
 
  private:
   void FindCorners();
+  Eigen::Vector2d PlayedAt(double time_s) const;
 
   const StretchDraft& draft_;
   std::vector<ContourCorner> corners_;

@@ -275,7 +275,7 @@ class StretchPlanner {
         const double from = apart_s * k, to = apart_s * (k + 1);
         const double s_mm = plan_.segments[n].s_mm.value(from);
         const Vector2d p = draft_.played[n].value(from);
-        ContourExcess(p, s_mm, excess);
+        ContourExcess(p, s_mm, draft_.segment_s() * static_cast<double>(n) + from, excess);
         contour_.NearCorners(s_mm, p, draft_.played[n].value(to), begin_s + from);
       }
       if (excess.any()) {
@@ -286,13 +286,17 @@ class StretchPlanner {
     return !exceeded_.empty();
   }
 
-  void ContourExcess(const Vector2d& p, double s_mm, Excess& excess) {
+  void ContourExcess(const Vector2d& p, double s_mm, double time_s, Excess& excess) {
     double tolerance_mm = 0.0;
     const double deviation_mm = contour_.Deviation(p, s_mm, kToleranceShare, tolerance_mm);
-    if (deviation_mm >= 0.0) {
-      contour_.Keep(deviation_mm);
-      excess.Judge(deviation_mm / (kToleranceShare * tolerance_mm), 0.6, FeedLimit::kContourTolerance);
+    if (deviation_mm < 0.0) {
+      return;
     }
+    contour_.Keep(deviation_mm);
+    excess.Judge(deviation_mm / (kToleranceShare * tolerance_mm), 0.6, FeedLimit::kContourTolerance);
+    const double allowed_mm = kToleranceShare * contour_.piece().tolerance_mm;
+    excess.Judge(contour_.Missed(p, s_mm, time_s, 2.0 * model_.filter.half_support_s()) / allowed_mm, 0.5,
+                 FeedLimit::kContourTolerance);
   }
 
   void MissedCorners() {
