@@ -563,6 +563,25 @@ AUXFUN/5
 FINI
 )";
 
+// What CATIA, Creo and NX write beside the motions, over lines and with empty fields, changes none of them.
+constexpr const char* kDescribed =
+    "$$-> CSYS / 1.0, 0.0, 0.0, 0.0, $\n   0.0, 1.0, 0.0, 0.0, $\n   0.0, 0.0, 1.0, 0.0\n"
+    "PARTNO part\nMSYS/0,0,0,1,0,0,0,1,0\nTOOLNO/1,MILL,1.0,,50.0,$\nON,,NOTE\nINTOL/ 0.01\nOUTTOL/ 0.01\n"
+    "TLAXIS/ 0.0, 0.0, 1.0\nSEQNO/10,INCR,10\nCLEARP/XYPLAN,20\n"
+    "FROM/10,10,0\nSPINDL/ON\nFEDRAT/600,MMPM\nGOTO/30,10,0\nARCSLP/ON\nGOTO/30,40,0\nDELAY/2,SEC\n"
+    "SPINDL/OFF\nREWIND/0\nFINI\n";
+
+TEST(CldataLaw, WhatOnlyDescribesChangesNothing) {
+  const PartProgram described = ReadPartProgram(kDescribed);
+  const PartProgram plain = ReadPartProgram(
+      "PARTNO part\nFROM/10,10,0\nSPINDL/ON\nFEDRAT/600,MMPM\nGOTO/30,10,0\nGOTO/30,40,0\nDELAY/2\n"
+      "SPINDL/OFF\nFINI\n");
+  ASSERT_TRUE(plain.faults.empty());
+  ASSERT_TRUE(described.faults.empty())
+      << described.faults[0].line << ":" << described.faults[0].column << " " << described.faults[0].message;
+  ExpectSame(plain.operations, described.operations, 1e-12);
+}
+
 TEST(CldataLaw, PostsOfDifferentHabitsGiveTheSameOperations) {
   const PartProgram plain = ReadPartProgram(kPlain), creo = ReadPartProgram(kCreo),
                     inches = ReadPartProgram(kInches);

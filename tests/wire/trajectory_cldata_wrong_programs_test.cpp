@@ -61,6 +61,14 @@ TEST(WrongCldata, IsRefusedWithReasonLineAndColumn) {
   tests::PrintFigure("wrong.cldata", count);
 }
 
+// What goes on over lines and is refused, or only describes, leaves no lines behind that read as statements.
+TEST(WrongCldata, OneCauseIsToldOnce) {
+  for (const char* name : {"catia_arc_whole", "unknown_word_goes_on", "fault_goes_on"}) {
+    SCOPED_TRACE(name);
+    EXPECT_EQ(ReadCldata(Content(std::string(name) + ".cldata")).faults.size(), 1u);
+  }
+}
+
 TEST(WrongCldata, StopsAtTheLimitOfFaults) {
   std::string text = "PARTNO/'X'\n";
   for (int i = 0; i < 1000; ++i) {

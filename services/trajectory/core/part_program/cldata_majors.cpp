@@ -11,7 +11,7 @@ struct MajorWord {
   CldataMajor major;
 };
 
-constexpr std::array<MajorWord, 38> kMajors = {{
+constexpr std::array<MajorWord, 50> kMajors = {{
     {"PARTNO", CldataMajor::kText},
     {"PPRINT", CldataMajor::kText},
     {"REMARK", CldataMajor::kText},
@@ -50,6 +50,18 @@ constexpr std::array<MajorWord, 38> kMajors = {{
     {"FINI", CldataMajor::kFinish},
     {"CLPRNT", CldataMajor::kText},
     {"NOPOST", CldataMajor::kText},
+    {"TOOLNO", CldataMajor::kText},
+    {"INTOL", CldataMajor::kText},
+    {"OUTTOL", CldataMajor::kText},
+    {"SEQNO", CldataMajor::kText},
+    {"ARCSLP", CldataMajor::kText},
+    {"CLEARP", CldataMajor::kText},
+    {"REWIND", CldataMajor::kText},
+    {"AUTOPS", CldataMajor::kText},
+    {"INDIRV", CldataMajor::kText},
+    {"INDIRP", CldataMajor::kText},
+    {"TLAXIS", CldataMajor::kToolAxis},
+    {"MSYS", CldataMajor::kFrame},
 }};
 
 }  // namespace
@@ -61,11 +73,14 @@ std::optional<CldataMajor> FindCldataMajor(std::string_view word) {
 }
 
 const char* AdviceOnCldataWord(std::string_view word) {
-  if (word == "GOHOME" || word == "INSERT" || word == "ORIGIN" || word == "TRACUT" || word == "ROTABL" ||
-      word == "ROTHED" || word == "ROTATE" || word == "TRANS" || word == "MSYS" || word == "TLAXIS") {
+  if (word == "INSERT") {
+    return "have the post write AUXFUN/n for an M word; G-code may not stand in CLDATA";
+  }
+  if (word == "GOHOME" || word == "ORIGIN" || word == "TRACUT" || word == "ROTABL" || word == "ROTHED" ||
+      word == "ROTATE" || word == "TRANS") {
     return "have the post write the motions themselves, as GOTO in the part's coordinates";
   }
-  if (word == "TLON" || word == "INDIRV" || word == "INDIRP" || word == "AUTOPS" || word == "GOFWD") {
+  if (word == "TLON" || word == "GOFWD") {
     return "have the post write arcs as CIRCLE with points, or as MOVARC";
   }
   return "not a word of this machine; see the table of supported words";

@@ -22,6 +22,8 @@ enum class CldataMajor : std::uint8_t {
   kCutter,
   kToolCompensation,
   kMultax,
+  kToolAxis,
+  kFrame,
   kCycle,
   kSpindle,
   kAuxiliary,

@@ -1,3 +1,6 @@
+#include <array>
+#include <cmath>
+
 #include "trajectory/core/part_program/cldata_reading.hpp"
 
 namespace lambdajet::trajectory {
@@ -113,9 +116,26 @@ bool CldataReading::Multax() {
   if (Size() == 1 && At(0).word != "ON" && At(0).word != "OFF") {
     return Fault(At(0).place, "MULTAX_UNKNOWN", "ON and OFF are known");
   }
-  multax_ = Size() == 0 || At(0).word == "ON";
-  if (!multax_) {
-    axis_ = {0.0, 0.0, 1.0};
+  const bool on = Size() == 0 || At(0).word == "ON";
+  if (!on && !Upright(axis_)) {
+    return Fault(statement_.place, "MULTAX_OFF_TILTED",
+                 "posts differ in where the tool stands then; write a GOTO with the axis 0,0,1 before");
+  }
+  multax_ = on;
+  return true;
+}
+
+// MSYS of NX: where the frame that its points are in stands in the part's, and the directions of its X and Y.
+bool CldataReading::Frame() {
+  if (!Count(9, 9)) {
+    return false;
+  }
+  constexpr std::array<double, 9> kSame = {0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0};
+  for (std::size_t i = 0; i < kSame.size(); ++i) {
+    if (!At(i).is_number || std::abs(At(i).value - kSame[i]) > kCldataAxisTolerance) {
+      return Fault(At(i).place, "FRAME_MOVED",
+                   "MSYS must be the part's own frame, 0,0,0,1,0,0,0,1,0; have the post write points in it");
+    }
   }
   return true;
 }

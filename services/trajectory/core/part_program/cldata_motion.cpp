@@ -63,7 +63,9 @@ bool CldataReading::GoDelta() {
 bool CldataReading::Traverse(const Vector& target) {
   rapid_ = false;
   if (jet_on_) {
-    return Fault(statement_.place, "TRAVERSE_WITH_JET_ON", "the jet is on; switch it off or cut with a feed");
+    return Fault(statement_.place, "TRAVERSE_WITH_JET_ON",
+                 "the jet is on; switch it off or cut with a feed. SPINDL pierces where the jet stands: "
+                 "behind the way there");
   }
   Move(OperationKind::kTraverse, target);
   return true;
@@ -109,7 +111,7 @@ bool CldataReading::Target(Vector& target) {
   }
   target = {At(0).value * unit_mm_, At(1).value * unit_mm_,
             Size() > 2 ? At(2).value * unit_mm_ : position_[2]};
-  return (Size() < 6 || ToolAxis()) && Driven(target);
+  return (Size() < 6 || ToolAxis(3)) && Driven(target);
 }
 
 bool CldataReading::Coordinate(const CldataParameter& p) {
@@ -120,22 +122,37 @@ bool CldataReading::Coordinate(const CldataParameter& p) {
          Fault(p.place, "COORDINATE_TOO_LARGE", "a coordinate is at most 1e6 mm");
 }
 
-bool CldataReading::ToolAxis() {
-  const Vector axis = {At(3).value, At(4).value, At(5).value};
+// Of three parameters from `first` on.
+bool CldataReading::ToolAxis(std::size_t first) {
+  Vector axis;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const CldataParameter& p = At(first + i);
+    if (!p.is_number) {
+      return Fault(p.place, "BAD_NUMBER", "a tool axis is three numbers");
+    }
+    axis[i] = p.value;
+  }
   const double length = std::sqrt(Dot(axis, axis));
   if (std::abs(length - 1.0) > kCldataVectorTolerance) {
-    return Fault(At(3).place, "TOOL_AXIS_NOT_UNIT", "a tool axis has the length 1, not " + Number(length));
+    return Fault(At(first).place, "TOOL_AXIS_NOT_UNIT",
+                 "a tool axis has the length 1, not " + Number(length));
   }
-  const bool upright =
-      std::abs(axis[0]) < kCldataAxisTolerance && std::abs(axis[1]) < kCldataAxisTolerance && axis[2] > 0.0;
+  const bool upright = Upright(axis);
   if (!multax_ && !upright) {
-    return Fault(At(3).place, "MULTAX_MISSING", "MULTAX/ON must stand before a tool axis other than 0,0,1");
+    return Fault(At(first).place, "MULTAX_MISSING",
+                 "MULTAX/ON must stand before a tool axis other than 0,0,1");
   }
   if (!upright && !Has(kAxisA) && !Has(kAxisB)) {
-    return Fault(At(3).place, "AXIS_NOT_DRIVEN", "this machine's jet does not tilt; the tool axis is 0,0,1");
+    return Fault(At(first).place, "AXIS_NOT_DRIVEN",
+                 "this machine's jet does not tilt; the tool axis is 0,0,1");
   }
   axis_ = {axis[0] / length, axis[1] / length, axis[2] / length};
   return true;
+}
+
+bool CldataReading::Upright(const Vector& axis) {
+  return std::abs(axis[0]) < kCldataAxisTolerance && std::abs(axis[1]) < kCldataAxisTolerance &&
+         axis[2] > 0.0;
 }
 
 // A machine without Z keeps the height that the program began at.

@@ -102,6 +102,10 @@ bool CldataReading::Obey(CldataMajor major) {
       return ToolCompensation();
     case CldataMajor::kMultax:
       return Multax();
+    case CldataMajor::kToolAxis:
+      return Count(3, 3) && ToolAxis(0);
+    case CldataMajor::kFrame:
+      return Frame();
     default:
       return ObeySwitch(major);
   }

@@ -65,6 +65,7 @@ class CldataReading {
   bool ToolCompensation();
   void SetKerf();
   bool Multax();
+  bool Frame();
   bool Tolerance();
   bool LoadTool();
   bool NameTool(double number);
@@ -96,7 +97,8 @@ class CldataReading {
   bool HasFeed();
   bool Target(Vector& target);
   bool Coordinate(const CldataParameter& p);
-  bool ToolAxis();
+  bool ToolAxis(std::size_t first);
+  static bool Upright(const Vector& axis);
   bool Has(AxisBit bit) const { return (options_.axes & bit) != 0; }
   bool Driven(const Vector& target);
 

@@ -4,6 +4,11 @@
 #include "trajectory/core/part_program/cldata_reading.hpp"
 
 namespace lambdajet::trajectory {
+namespace {
+
+constexpr double kSecondsPerMinute = 60.0;
+
+}  // namespace
 
 // A jet has no revolutions, but a wheel's program needs them for feeds a revolution.
 bool CldataReading::Spindle() {
@@ -115,14 +120,23 @@ bool CldataReading::Coolant() {
   return Abrasive(At(0).word != "OFF");
 }
 
+// DELAY/2, DELAY/2,SEC and, in turns of the spindle, DELAY/3,REV.
 bool CldataReading::Delay() {
-  if (!Count(1, 1)) {
+  if (!Count(1, 2)) {
     return false;
   }
-  if (!At(0).is_number || !(At(0).value >= 0.0 && At(0).value <= 3600.0)) {
+  const bool turns = Size() == 2 && At(1).word == "REV";
+  if (Size() == 2 && !turns && At(1).word != "SEC") {
+    return Fault(At(1).place, "DWELL_UNIT_UNKNOWN", "SEC and REV are known");
+  }
+  if (turns && !(spindle_per_min_ > 0.0)) {
+    return Fault(At(1).place, "DWELL_NEEDS_SPINDLE_SPEED", "SPINDL must say turns a minute before");
+  }
+  const double s = At(0).value * (turns ? kSecondsPerMinute / spindle_per_min_ : 1.0);
+  if (!At(0).is_number || !(s >= 0.0 && s <= 3600.0)) {
     return Fault(At(0).place, "DWELL_TIME_OUT_OF_RANGE", "a dwell takes 0 to 3600 s");
   }
-  Add(OperationKind::kDwell)->value = At(0).value;
+  Add(OperationKind::kDwell)->value = s;
   return true;
 }
 

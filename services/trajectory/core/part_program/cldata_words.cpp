@@ -4,6 +4,9 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <optional>
+
+#include "trajectory/core/part_program/cldata_majors.hpp"
 
 namespace lambdajet::trajectory {
 namespace {
@@ -51,6 +54,9 @@ bool ReadNumber(std::string_view text, double& value) {
   return error == std::errc() && end == text.data() + text.size() && std::isfinite(value);
 }
 
+// Behind these comments of Creo stands a statement of its own notation, which may go on over lines.
+constexpr std::string_view kCreoComment = "$$->";
+
 bool TakesText(std::string_view major) {
   return std::find(kTakeText.begin(), kTakeText.end(), major) != kTakeText.end();
 }
@@ -87,12 +93,35 @@ bool CldataLines::Next(CldataStatement& statement, CldataFault& fault) {
   while (NextLine()) {
     const std::size_t first = line_.find_first_not_of(" \t");
     if (first == std::string_view::npos || line_.substr(first).starts_with("$$")) {
+      SkipComment(first);
       continue;
     }
     Scan(statement, fault);
+    if (fault.reason != nullptr) {
+      SkipContinued();
+    }
     return true;
   }
   return false;
+}
+
+void CldataLines::SkipComment(std::size_t first) {
+  if (first != std::string_view::npos && line_.substr(first).starts_with(kCreoComment)) {
+    while (line_.find_last_not_of(" \t") != std::string_view::npos &&
+           line_[line_.find_last_not_of(" \t")] == '$' && NextLine()) {
+    }
+  }
+}
+
+// Whether the comment that begins there is the mark by which the line goes on in the next.
+bool CldataLines::Continued(std::size_t comment) const {
+  return comment < line_.size() && (comment + 1 == line_.size() || line_[comment + 1] != '$');
+}
+
+// The rest of a statement that is not read is no statement of its own.
+void CldataLines::SkipContinued() {
+  while (Continued(CommentAt(line_)) && NextLine()) {
+  }
 }
 
 void CldataLines::Scan(CldataStatement& statement, CldataFault& fault) {
@@ -123,15 +152,21 @@ void CldataLines::Scan(CldataStatement& statement, CldataFault& fault) {
     Refuse(fault, first, first + 1, "BAD_CHARACTER", "a statement begins with a word, as in GOTO/10,20,0");
     return;
   }
+  const std::optional<CldataMajor> word = FindCldataMajor(statement.major);
+  const bool of_letters = std::all_of(statement.major.begin(), statement.major.end(), Letter);
+  const bool written =
+      at >= line_.size() || line_[at] == '/' || line_[at] == '$' || (line_[at] == ',' && of_letters);
+  if (written && word.value_or(CldataMajor::kText) == CldataMajor::kText) {
+    SkipContinued();  // what describes, or is refused by its first word, is not looked at
+    return;
+  }
   Parameters(statement, fault, at);
 }
 
 // From behind the major word to the end of the statement, over continued lines.
 bool CldataLines::Parameters(CldataStatement& statement, CldataFault& fault, std::size_t at) {
   std::size_t end = CommentAt(line_);
-  const auto continued = [&] {
-    return end < line_.size() && (end + 1 == line_.size() || line_[end + 1] != '$');
-  };
+  const auto continued = [&] { return Continued(end); };
   if (at < end && line_[at] == '=') {
     return Refuse(
         fault, at, at + 1, "APT_SOURCE",

@@ -53,6 +53,9 @@ class CldataLines {
 
  private:
   bool NextLine();
+  void SkipComment(std::size_t first);
+  bool Continued(std::size_t comment) const;
+  void SkipContinued();
   void Scan(CldataStatement& statement, CldataFault& fault);
   bool Parameters(CldataStatement& statement, CldataFault& fault, std::size_t at);
   bool Parameter(CldataStatement& statement, CldataFault& fault, std::size_t from, std::size_t to);
