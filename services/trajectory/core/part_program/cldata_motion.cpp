@@ -9,11 +9,7 @@ bool CldataReading::From() {
     return Fault(statement_.place, "FROM_AFTER_MOTION", "FROM says where the program begins; GOTO moves");
   }
   Vector target;
-  if (!Target(target)) {
-    return false;
-  }
-  Move(OperationKind::kTraverse, target);
-  return true;
+  return Target(target) && Traverse(target);
 }
 
 bool CldataReading::Goto() {
