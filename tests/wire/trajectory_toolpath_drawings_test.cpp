@@ -97,6 +97,92 @@ TEST(WrongDrawings, FindingsNamePlaceLayerAndLine) {
   EXPECT_DOUBLE_EQ(findings[0].size_mm, 0.4);
 }
 
+std::string Square(double size) {
+  const std::string far = std::to_string(size);
+  return Group(0, "LWPOLYLINE") + Group(8, "CUT") + Group(70, "1") + Group(10, "0") + Group(20, "0") +
+         Group(10, far) + Group(20, "0") + Group(10, far) + Group(20, far) + Group(10, "0") + Group(20, far);
+}
+std::string Disc(const std::string& layer, const std::string& x, const std::string& more = "") {
+  return Group(0, "CIRCLE") + Group(8, layer) + more + Group(10, x) + Group(20, "20") + Group(40, "5");
+}
+std::string Layer(const std::string& name, const std::string& flags, const std::string& colour) {
+  return Group(0, "LAYER") + Group(2, name) + Group(70, flags) + Group(62, colour);
+}
+ContourOptions Unit(double mm) {
+  ContourOptions options;
+  options.unit_mm = mm;
+  return options;
+}
+std::vector<std::string> Reasons(const ContourSet& set, bool blocks) {
+  std::vector<std::string> reasons;
+  for (const Finding& f : set.findings) {
+    if (f.blocks == blocks) {
+      reasons.emplace_back(f.reason);
+    }
+  }
+  return reasons;
+}
+
+TEST(Drawings, WhatNobodySeesOnTheDrawingIsNotCutAndTold) {
+  const std::string layers = Group(0, "SECTION") + Group(2, "TABLES") + Group(0, "TABLE") +
+                             Group(2, "LAYER") + Layer("Cut", "0", "7") + Layer("Off", "0", "-7") +
+                             Layer("Frozen", "1", "7") + Group(0, "ENDTAB") + Group(0, "ENDSEC");
+  const std::string block = Group(0, "BLOCK") + Group(2, "PAIR") + Group(10, "0") + Group(20, "0") +
+                            Disc("0", "20") + Disc("CUT", "40") + Group(0, "ENDBLK");
+  const auto insert = [](const std::string& layer) {
+    return Group(0, "INSERT") + Group(8, layer) + Group(2, "pair") + Group(10, "0") + Group(20, "0");
+  };
+  struct Case {
+    std::string entities;
+    std::size_t contours;
+    std::vector<std::string> told;
+  };
+  const std::vector<Case> cases = {
+      {Disc("OFF", "20") + Disc("FROZEN", "40") + Disc("CUT", "60"), 2, {"LAYER_HIDDEN", "LAYER_HIDDEN"}},
+      {insert("CUT"), 3, {}},
+      {insert("OFF"), 2, {"LAYER_HIDDEN"}},
+      {insert("FROZEN"), 1, {"LAYER_HIDDEN"}},
+      {Disc("CUT", "20", Group(60, "1")), 1, {"ENTITY_INVISIBLE"}},
+      {Disc("CUT", "20", Group(67, "1")), 1, {"PAPER_SPACE"}},
+      {Group(0, "TEXT") + Group(8, "off") + Group(10, "1") + Group(20, "1"), 1, {}},
+  };
+  for (const Case& c : cases) {
+    const ContourSet set = FindContours(ReadDxf(layers + Dxf(Square(80.0) + c.entities, block)), Unit(1.0));
+    EXPECT_EQ(set.contours.size(), c.contours);
+    EXPECT_EQ(Reasons(set, true), std::vector<std::string>{});
+    EXPECT_EQ(Reasons(set, false), c.told);
+  }
+}
+
+TEST(Drawings, WhatHasNoLengthOrAWidthIsTold) {
+  const std::string speck =
+      Group(0, "LINE") + Group(8, "CUT") + Group(10, "3") + Group(20, "1") + Group(11, "3") + Group(21, "1");
+  const std::string dot =
+      Group(0, "LWPOLYLINE") + Group(8, "CUT") + Group(70, "0") + Group(10, "20") + Group(20, "20");
+  const std::string wide = Group(0, "LWPOLYLINE") + Group(8, "CUT") + Group(70, "1") + Group(43, "4") +
+                           Group(10, "20") + Group(20, "40") + Group(42, "1") + Group(10, "40") +
+                           Group(20, "40") + Group(42, "1");
+  const ContourSet set = FindContours(ReadDxf(Dxf(Square(80.0) + speck + dot + wide)), Unit(25.4));
+  EXPECT_EQ(Reasons(set, true), std::vector<std::string>{});
+  EXPECT_EQ(Reasons(set, false), (std::vector<std::string>{"WIDE_POLYLINE", "NO_LENGTH", "NO_LENGTH"}));
+  EXPECT_EQ(set.contours.size(), 2u);
+  ASSERT_EQ(set.findings.size(), 3u);
+  EXPECT_NEAR((set.findings[1].at_mm - Vector2d(76.2, 25.4)).norm(), 0.0, 1e-9);
+}
+
+// Dimensions stand as text in blocks of their own, which drawings keep when nobody inserts them any more.
+TEST(Drawings, ABlockThatIsNotInsertedBlocksNothing) {
+  const std::string block = Group(0, "BLOCK") + Group(2, "*D0") + Group(10, "0") + Group(20, "0") +
+                            Group(0, "MTEXT") + Group(8, "0") + Group(10, "5") + Group(20, "5") +
+                            Group(0, "ENDBLK");
+  EXPECT_EQ(Reasons(FindContours(ReadDxf(Dxf(Square(80.0), block)), Unit(1.0)), true),
+            std::vector<std::string>{});
+  const std::string inserted =
+      Group(0, "INSERT") + Group(8, "CUT") + Group(2, "*d0") + Group(10, "0") + Group(20, "0");
+  EXPECT_EQ(Reasons(FindContours(ReadDxf(Dxf(Square(80.0) + inserted, block)), Unit(1.0)), true),
+            std::vector<std::string>{"UNKNOWN_ENTITY"});
+}
+
 TEST(Drawings, WhatIsDrawnTwiceIsCutOnceAndTold) {
   std::string circle =
       Group(0, "CIRCLE") + Group(8, "CUT") + Group(10, "20") + Group(20, "20") + Group(40, "9");

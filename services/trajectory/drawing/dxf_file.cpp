@@ -18,6 +18,7 @@
 #include <cmath>
 #include <cstdio>
 #include <exception>
+#include <map>
 #include <memory>
 #include <numbers>
 
@@ -100,13 +101,28 @@ class DxfReader {
         Add(*entities->getEntity(i), AffineMap{}, "", 0);
       }
     }
+    TellHidden();
     return std::move(drawing_);
   }
 
  private:
-  void Tell(std::string_view reason, std::string entity, std::uint32_t line, std::string message) {
+  void Tell(std::string_view reason, std::string entity, std::uint32_t line, std::string message,
+            bool blocks = true) {
     drawing_.findings.push_back(
-        {reason, true, layer_, std::move(entity), line, {0, 0}, 0.0, std::move(message)});
+        {reason, blocks, layer_, std::move(entity), line, at_, 0.0, std::move(message)});
+  }
+  void TellHidden() {
+    for (const auto& [layer, count] : hidden_) {
+      drawing_.findings.push_back({"LAYER_HIDDEN",
+                                   false,
+                                   layer,
+                                   "",
+                                   0,
+                                   {0, 0},
+                                   0.0,
+                                   "layer " + layer + " is switched off or frozen; its " +
+                                       std::to_string(count) + " entities are left out"});
+    }
   }
 
   // The double that the file says; what the library carries is its place in the table.
@@ -138,6 +154,10 @@ class DxfReader {
     }
     type_ = entity.getRecord(kLightCarrierCode, carried) ? "LWPOLYLINE" : entity.getEntityName();
     curves_.clear();
+    if (Hidden(entity)) {
+      return;
+    }
+    const std::size_t told = drawing_.findings.size();
     switch (entity.typeId()) {
       case dimeBase::dimeInsertType:
         return Insert(static_cast<dimeInsert&>(entity), map, depth);
@@ -162,8 +182,27 @@ class DxfReader {
       default:
         Tell("UNKNOWN_ENTITY", type_, line_, type_ + " is no contour");
     }
+    if (curves_.empty() && drawing_.findings.size() == told) {
+      Tell("NO_LENGTH", type_, line_, "begins and ends in one place without a way between; left out", false);
+    }
     Keep();
   }
+
+  // An insertion on a layer that is only off shows what stands on other layers.
+  bool Hidden(dimeEntity& entity) {
+    std::string name = layer_;
+    std::transform(name.begin(), name.end(), name.begin(),
+                   [](char c) { return c >= 'a' && c <= 'z' ? static_cast<char>(c - 'a' + 'A') : c; });
+    const auto found = guarded_.hidden_layers.find(name);
+    if (found == guarded_.hidden_layers.end() ||
+        (entity.typeId() == dimeBase::dimeInsertType && found->second == HiddenLayer::kOff)) {
+      return false;
+    }
+    ++hidden_[layer_];
+    return true;
+  }
+
+  void StandAt(const AffineMap& map, const Vector2d& point) { at_ = map.linear * point + map.offset; }
 
   void Keep() {
     if (curves_.empty() || !Near()) {
@@ -230,7 +269,8 @@ class DxfReader {
 
   void Line(const dimeLine& line, const AffineMap& map) {
     const Vector3d a = Exact(line.getCoords(0)), b = Exact(line.getCoords(1));
-    if (Flat(a.z() - b.z())) {
+    StandAt(map, a.head<2>());
+    if (Flat(a.z() - b.z()) && a.head<2>() != b.head<2>()) {
       Push(map, LineCurve{a.head<2>(), b.head<2>()});
     }
   }
@@ -243,11 +283,12 @@ class DxfReader {
 
   void Arc(const dimeArc& arc, const AffineMap& map) {
     AffineMap object;
+    dimeVec3f center;
+    arc.getCenter(center);
+    StandAt(map, Exact(center).head<2>());
     if (!InPlane(arc.getExtrusionDir(), map, object)) {
       return;
     }
-    dimeVec3f center;
-    arc.getCenter(center);
     const double start = Exact(arc.getStartAngle()) * kDegree_rad;
     double sweep = std::fmod(Exact(arc.getEndAngle()) * kDegree_rad - start, 2.0 * kPi);
     sweep = sweep <= 1e-12 ? sweep + 2.0 * kPi : sweep;
@@ -256,6 +297,7 @@ class DxfReader {
 
   void Circle(const dimeCircle& circle, const AffineMap& map) {
     AffineMap object;
+    StandAt(map, Exact(circle.getCenter()).head<2>());
     if (InPlane(circle.getExtrusionDir(), map, object)) {
       PushArc(object, Exact(circle.getCenter()).head<2>(), Exact(circle.getRadius()), 0.0, 2.0 * kPi);
     }
@@ -264,6 +306,7 @@ class DxfReader {
   void Ellipse(const dimeEllipse& ellipse, const AffineMap& map) {
     AffineMap unused;
     const Vector3d major = Exact(ellipse.getMajorAxisEndpoint());
+    StandAt(map, Exact(ellipse.getCenter()).head<2>());
     if (!InPlane(ellipse.getExtrusionDir(), map, unused) || !Flat(major.z())) {
       return;
     }
@@ -308,13 +351,14 @@ class DxfReader {
     if ((polyline.getFlags() & kMesh) != 0) {
       return Tell("UNKNOWN_ENTITY", type_, line_, "a mesh is no contour");
     }
-    if (!InPlane(polyline.getExtrusionDir(), map, object)) {
-      return;
-    }
     const int n = polyline.getNumCoordVertices();
     const auto at = [&](int i) -> Vector2d {
       return Exact(polyline.getCoordVertex(i)->getCoords()).head<2>();
     };
+    StandAt(map, n > 0 ? at(0) : Vector2d(Vector2d::Zero()));
+    if (!InPlane(polyline.getExtrusionDir(), map, object)) {
+      return;
+    }
     const int edges = n < 2 ? 0 : (polyline.getFlags() & 1) != 0 ? n : n - 1;
     for (int i = 0; i < edges; ++i) {
       dimeParam bulge;
@@ -327,6 +371,7 @@ class DxfReader {
     SplineCurve curve;
     curve.degree = spline.getDegree();
     const int n = spline.getNumControlPoints();
+    StandAt(map, n > 0 ? Vector2d(Exact(spline.getControlPoint(0)).head<2>()) : Vector2d(Vector2d::Zero()));
     for (int i = 0; i < spline.getNumKnots(); ++i) {
       curve.knots.push_back(Exact(spline.getKnotValue(i)));
     }
@@ -357,6 +402,7 @@ class DxfReader {
   void Insert(const dimeInsert& insert, const AffineMap& map, int depth) {
     AffineMap object;
     dimeBlock* block = insert.getBlock();
+    StandAt(map, Exact(insert.getInsertionPoint()).head<2>());
     if (block == nullptr) {
       return Tell("UNKNOWN_BLOCK", type_, line_, "the file has no block of that name");
     }
@@ -414,6 +460,8 @@ class DxfReader {
   Drawing drawing_;
   std::vector<Curve> curves_;
   std::string layer_, type_;
+  Vector2d at_ = Vector2d::Zero();
+  std::map<std::string, std::size_t> hidden_;  // entities by layer
   std::uint32_t line_ = 0;
   std::size_t curve_count_ = 0;
   std::size_t insertions_ = 0;

@@ -5,8 +5,7 @@
 // groups apart, behind a guard of our own (drawing/dxf_guard). Frames: the drawing's X and Y; what does not lie in a plane
 // of constant Z is refused. Units: the file's; Drawing::unit_mm says which. Threads: pure. Cost: about 0.5 us a group.
 // Errors: findings, those of dxf_guard and UNKNOWN_BLOCK, BLOCK_TOO_DEEP, DXF_TOO_LARGE, ENTITY_NOT_IN_PLANE, ENTITY_TOO_FAR,
-// BAD_CURVE;
-// nothing is thrown and nothing is skipped without being told.
+// BAD_CURVE; told without blocking: LAYER_HIDDEN, NO_LENGTH. Nothing is thrown and nothing is skipped without being told.
 #pragma once
 
 #include <string_view>

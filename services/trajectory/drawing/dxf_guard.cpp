@@ -4,6 +4,7 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <map>
 #include <numbers>
 #include <set>
 
@@ -16,6 +17,9 @@ constexpr std::size_t kMostVertices = 32'000;  // the library counts them in 16 
 constexpr std::size_t kMostNumbers =
     (std::size_t{1} << 24) - 16;  // places that single precision still tells apart
 constexpr double kLargestNumber = 1e9;
+constexpr double kFlat = 1e-6;  // what may differ in Z
+constexpr int kExternal = 4 | 8;
+constexpr int kSpatialPolyline = 8;
 
 struct Group {
   int code = 0;
@@ -78,6 +82,14 @@ std::string_view Trimmed(std::string_view text) {
   return text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
 }
 
+// Names of blocks and layers differ by more than case.
+std::string NameOf(std::string_view text) {
+  std::string name(text);
+  std::transform(name.begin(), name.end(), name.begin(),
+                 [](char c) { return c >= 'a' && c <= 'z' ? static_cast<char>(c - 'a' + 'A') : c; });
+  return name;
+}
+
 class Guard {
  public:
   explicit Guard(std::string_view file) : rest_(file) { result_.numbers = {0.0, 1.0}; }
@@ -100,6 +112,8 @@ class Guard {
       result_.text.clear();
     } else {
       Put(0, "EOF");
+      TellReached("");
+      TellLeftOut();
     }
     return std::move(result_);
   }
@@ -113,15 +127,56 @@ class Guard {
     }
     refused_ = true;
   }
-  void Tell(const Entity& e, std::string_view reason, std::string message) {
-    result_.findings.push_back({reason,
-                                true,
-                                std::string(e.Text(8).substr(0, kLongestName)),
-                                std::string(e.type.substr(0, 40)),
-                                e.line,
-                                {Peek(e, 10), Peek(e, 20)},
-                                0.0,
-                                std::move(message)});
+  // Of an entity: told where its block is inserted, or it stands in no block.
+  void Tell(const Entity& e, std::string_view reason, std::string message, bool blocks = true) {
+    inside_[block_].findings.push_back({reason,
+                                        blocks,
+                                        std::string(e.Text(8).substr(0, kLongestName)),
+                                        std::string(e.type.substr(0, 40)),
+                                        e.line,
+                                        {Peek(e, 10), Peek(e, 20)},
+                                        0.0,
+                                        std::move(message)});
+  }
+  void TellReached(const std::string& first) {
+    std::vector<std::string> next = {first};
+    std::set<std::string> reached = {first};
+    while (!next.empty()) {
+      const Inside inside = std::move(inside_[next.back()]);
+      next.pop_back();
+      result_.findings.insert(result_.findings.end(), inside.findings.begin(), inside.findings.end());
+      for (const auto& [name, insertion] : inside.insertions) {
+        if (references_.contains(name)) {
+          result_.findings.push_back(insertion);
+        }
+        if (reached.insert(name).second) {
+          next.push_back(name);
+        }
+      }
+    }
+  }
+  void TellLeftOut() {
+    if (invisible_ > 0) {
+      result_.findings.push_back({"ENTITY_INVISIBLE",
+                                  false,
+                                  "",
+                                  "",
+                                  0,
+                                  {0, 0},
+                                  0.0,
+                                  std::to_string(invisible_) + " invisible entities are left out"});
+    }
+    if (on_paper_ > 0) {
+      result_.findings.push_back(
+          {"PAPER_SPACE",
+           false,
+           "",
+           "",
+           0,
+           {0, 0},
+           0.0,
+           std::to_string(on_paper_) + " entities of the paper space are left out; the model space is cut"});
+    }
   }
 
   // ---- reading ----
@@ -200,8 +255,51 @@ class Guard {
       Put(2, name);
       Entities(name == "BLOCKS");
       Put(0, "ENDSEC");
+    } else if (name == "TABLES") {
+      Layers();
     } else {
-      while (Next() && !(group_.code == 0 && group_.value == "ENDSEC")) {
+      Clips();
+    }
+  }
+
+  // Layers that are switched off or frozen.
+  void Layers() {
+    std::string layer;
+    bool of_layer = false;
+    while (Next() && !(group_.code == 0 && group_.value == "ENDSEC")) {
+      int number = 0;
+      if (group_.code == 0) {
+        of_layer = group_.value == "LAYER";
+        layer.clear();
+      } else if (of_layer && group_.code == 2) {
+        layer = NameOf(group_.value);
+      } else if (of_layer && group_.code == 70 && Integer(group_.value, -32768, 32767, number) &&
+                 (number & 1) != 0) {
+        result_.hidden_layers[layer] = HiddenLayer::kFrozen;
+      } else if (of_layer && group_.code == 62 && Integer(group_.value, -32768, 32767, number) &&
+                 number < 0) {
+        result_.hidden_layers.emplace(layer, HiddenLayer::kOff);
+      }
+    }
+  }
+
+  // Of all other sections only what clips insertions matters, and only that it is there.
+  void Clips() {
+    bool filter = false;
+    while (Next() && !(group_.code == 0 && group_.value == "ENDSEC")) {
+      filter = group_.code == 0 ? group_.value == "SPATIAL_FILTER" : filter;
+      if (filter && group_.code == 71 && group_.value == "1") {
+        result_.findings.push_back(
+            {"CLIPPED_INSERTION",
+             true,
+             "",
+             "",
+             group_.line,
+             {0, 0},
+             0.0,
+             "the drawing clips an insertion (XCLIP), which is not followed; explode and "
+             "trim it, and purge the drawing"});
+        filter = false;
       }
     }
   }
@@ -239,6 +337,7 @@ class Guard {
         Block(entity);
       } else if (in_blocks && entity.type == "ENDBLK" && in_block) {
         in_block = false;
+        block_.clear();
         Put(0, "ENDBLK");
       } else if (in_block == in_blocks && entity.type != "BLOCK" && entity.type != "ENDBLK") {
         Write(entity);
@@ -277,10 +376,14 @@ class Guard {
   }
 
   void Block(const Entity& entity) {
-    std::string name(entity.Text(2));
+    const std::string name = NameOf(entity.Text(2));
     if (!GoodName(name) || !blocks_.insert(name).second) {
       Refuse(entity.line, "DUPLICATE_BLOCK", "a block needs a name of its own, of at most 255 characters");
       return;
+    }
+    block_ = name;
+    if ((CountOf(entity, 70, 0) & kExternal) != 0) {
+      references_.insert(name);
     }
     Simple(entity, *KeepOf("BLOCK"));
   }
@@ -337,10 +440,21 @@ class Guard {
   }
   static bool GoodName(std::string_view name) { return !name.empty() && name.size() <= kLongestName; }
 
+  // What nobody sees on the drawing is not cut.
+  bool LeftOut(const Entity& entity) {
+    const bool paper = entity.Text(67) == "1", unseen = entity.Text(60) == "1";
+    if (KeepOf(entity.type) != nullptr) {
+      on_paper_ += paper ? 1 : 0;
+      invisible_ += unseen && !paper ? 1 : 0;
+    }
+    // Entities of other kinds would be refused; on layer 0 of a block they stand on the insertion's layer.
+    const bool hidden = KeepOf(entity.type) == nullptr &&
+                        result_.hidden_layers.contains(NameOf(entity.Text(8).empty() ? "0" : entity.Text(8)));
+    return paper || unseen || hidden;
+  }
+
   void Write(const Entity& entity) {
-    int paper = 0;
-    const Group* space = entity.Find(67);
-    if (space != nullptr && Integer(space->value, 0, 1, paper) && paper == 1) {
+    if (LeftOut(entity)) {
       return SkipFollowers(entity);
     }
     if (entity.type == "SEQEND" || entity.type == "ATTDEF" || entity.type == "VIEWPORT") {
@@ -359,8 +473,10 @@ class Guard {
         return SkipFollowers(entity);
       }
     }
-    if (entity.type == "INSERT" && in_entities_ &&
-        blocks_.find(std::string(entity.Text(2))) == blocks_.end()) {
+    if (entity.type == "INSERT") {
+      Insertion(entity);
+    }
+    if (entity.type == "INSERT" && in_entities_ && !blocks_.contains(NameOf(entity.Text(2)))) {
       Tell(entity, "UNKNOWN_BLOCK", "no block of that name stands before this insertion");
       return SkipFollowers(entity);
     }
@@ -373,6 +489,31 @@ class Guard {
     } else {
       Simple(entity, *keep);
       SkipFollowers(entity);
+    }
+  }
+
+  void Insertion(const Entity& entity) {
+    inside_[block_].insertions.emplace(
+        NameOf(entity.Text(2)),
+        Finding{
+            "EXTERNAL_REFERENCE",
+            true,
+            std::string(entity.Text(8).substr(0, kLongestName)),
+            "INSERT",
+            entity.line,
+            {Peek(entity, 10), Peek(entity, 20)},
+            0.0,
+            "the block is another drawing, which this file does not hold; bind it, or send that drawing"});
+  }
+
+  // Cut along the middle, which hides that the drawn width is lost.
+  void TellWidth(const Entity& entity) {
+    for (const Group& group : entity.groups) {
+      double width = 0.0;
+      if ((group.code == 40 || group.code == 41 || group.code == 43) && Real(group.value, width) &&
+          width > 0.0) {
+        return Tell(entity, "WIDE_POLYLINE", "is drawn with a width; its middle is cut", false);
+      }
     }
   }
 
@@ -404,7 +545,8 @@ class Guard {
   void Simple(const Entity& entity, const Keep& keep) {
     Open(entity);
     if (entity.type == "BLOCK" || entity.type == "INSERT") {
-      Put(2, GoodName(entity.Text(2)) ? entity.Text(2) : "?");
+      const std::string name = NameOf(entity.Text(2));
+      Put(2, GoodName(name) ? name : "?");
     }
     Reals(entity, keep);
     const auto optional = [&](int code, double missing) {
@@ -434,6 +576,7 @@ class Guard {
     if (vertices.size() > kMostVertices) {
       return Tell(entity, "TOO_MANY_VERTICES", "a polyline has at most 32000 vertices; split it");
     }
+    TellWidth(entity);
     Put(0, "POLYLINE");
     Common(entity);
     PutReal(kLightCarrierCode, 1.0);
@@ -486,6 +629,10 @@ class Guard {
   }
 
   void Polyline(const Entity& entity, const Keep& keep) {
+    const std::size_t before = result_.text.size();
+    const bool spatial = (CountOf(entity, 70, 0) & kSpatialPolyline) != 0;
+    double lowest = kLargestNumber, highest = -kLargestNumber;
+    TellWidth(entity);
     Open(entity);
     Put(66, "1");
     Reals(entity, keep);
@@ -500,11 +647,17 @@ class Guard {
                "a vertex needs 10 and 20, a polyline at most 32000 of them");
         return;
       }
+      lowest = std::min(lowest, Peek(vertex, 30));
+      highest = std::max(highest, Peek(vertex, 30));
       Put(0, "VERTEX");
       Put(8, "0");
       Reals(vertex, *KeepOf("VERTEX"));
     }
     Put(0, "SEQEND");
+    if (spatial && highest - lowest > kFlat) {
+      result_.text.resize(before);
+      Tell(entity, "ENTITY_NOT_IN_PLANE", "the entity climbs; its Z must not change");
+    }
     if (!refused_ && !(group_.code == 0 && group_.value == "SEQEND")) {
       Refuse(group_.line, "BAD_STRUCTURE", "a polyline's vertices end with SEQEND");
     }
@@ -529,8 +682,17 @@ class Guard {
   bool refused_ = false;
   bool ended_ = false;
   bool in_entities_ = false;
+  struct Inside {
+    std::vector<Finding> findings;
+    std::map<std::string, Finding> insertions;  // by block: what is told where that is no block of this file
+  };
+
   std::set<std::string> sections_;
   std::set<std::string> blocks_;
+  std::set<std::string> references_;  // blocks that are other drawings
+  std::map<std::string, Inside> inside_;
+  std::string block_;  // empty: in none
+  std::size_t invisible_ = 0, on_paper_ = 0;
   GuardedDxf result_;
 };
 

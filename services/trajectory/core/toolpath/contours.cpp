@@ -64,6 +64,9 @@ class ContourFinder {
             "the file does not say its unit ($INSUNITS is missing or 0); name it with --units mm or inch"});
       return std::move(set_);
     }
+    for (Finding& f : set_.findings) {  // told in the drawing's unit
+      f.at_mm *= unit_mm;
+    }
     Flatten(unit_mm);
     DropDuplicates();
     Join();

@@ -4,7 +4,7 @@
 // overlapping pieces refused. A contour inside an odd number of others is a hole, else the outline of a part.
 // Frames: the drawing's. Units: mm. Threads: pure. Cost: n log n in the pieces where they are short against the drawing.
 // Errors: findings OPEN_CONTOUR, GAP_TOO_WIDE, BRANCHING_CONTOUR, DUPLICATE_ENTITY, CROSSING_CONTOURS, CURVE_NOT_FOLLOWED,
-// NO_AREA, NOTHING_TO_CUT, DRAWING_TOO_DENSE, UNKNOWN_UNITS and those the drawing brings along.
+// NO_AREA, NOTHING_TO_CUT, DRAWING_TOO_DENSE, UNKNOWN_UNITS and those the drawing brings along, in mm.
 #pragma once
 
 #include <string>

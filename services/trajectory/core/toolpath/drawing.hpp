@@ -49,6 +49,7 @@ struct Finding {
   std::string layer;
   std::string entity;      // "LINE", "LWPOLYLINE", …; empty: the whole file
   std::uint32_t line = 0;  // of the file; 0: unknown
+  // In the drawing's unit until FindContours; (0, 0) where the reader knows none.
   Eigen::Vector2d at_mm = Eigen::Vector2d::Zero();
   double size_mm = 0.0;  // gap, overlap, radius that would be right: as the reason says
   std::string message;
