@@ -70,8 +70,8 @@ TEST_P(HostileLaws, HoldOnHostilePrograms) {
   options.compensate = GetParam();
   Worst worst;
   double slowest = 0.0;
-  double slowest_of_modes =
-      0.0;  // where a tolerance of micrometres is crossed more slowly than a stop would take
+  // Where a tolerance of micrometres is crossed more slowly than a stop would take, and where feeds change below the grid.
+  double slowest_of_modes = 0.0, slowest_of_feeds = 0.0;
   const Seeds seeds = WantedSeeds({17, 32});
   for (int seed = seeds.first; seed <= seeds.last; ++seed) {
     HostileProgram program(static_cast<unsigned>(seed));
@@ -86,8 +86,10 @@ TEST_P(HostileLaws, HoldOnHostilePrograms) {
     if (planned.faults.empty()) {
       ExpectPlanLaws(m, text, planned, worst);
       const double of_stopping = planned.cutting_time_s / StoppingEverywhere_s(m, text);
-      (program.ChangesModes() ? slowest_of_modes : slowest) =
-          std::max(program.ChangesModes() ? slowest_of_modes : slowest, of_stopping);
+      double& worst_of_kind = program.ChangesModes()               ? slowest_of_modes
+                              : program.ChangesFeedInShortBlocks() ? slowest_of_feeds
+                                                                   : slowest;
+      worst_of_kind = std::max(worst_of_kind, of_stopping);
     }
   }
   std::printf("seeds %d to %d: ", seeds.first, seeds.last);
@@ -95,6 +97,7 @@ TEST_P(HostileLaws, HoldOnHostilePrograms) {
     EXPECT_LE(slowest, 1.3);
     tests::PrintFigure("hostile.of_stopping_everywhere", slowest);
     tests::PrintFigure("hostile.of_stopping_everywhere_in_modes", slowest_of_modes);
+    tests::PrintFigure("hostile.of_stopping_everywhere_in_short_feeds", slowest_of_feeds);
   }
   Tell("hostile", static_cast<std::size_t>(seeds.last - seeds.first + 1), GetParam(), worst);
 }

@@ -3,7 +3,8 @@
 // Model: the distance of each planned point from the pieces of its own run about the same path length, each in shares of its
 // own tolerance; of each corner from the chords of planned points about it, because a plan that turns back on itself may stay
 // on the contour and yet miss its corner; and of the contour's places from those chords, because a plan may cut across an arc
-// that is smaller than the smoothing is long and yet lie near its neighbours. A corner is met by its own cut only; the end of a cut that is left at speed may be met just behind it.
+// that is smaller than the smoothing is long and yet lie near its neighbours. A corner is met by its own cut only; the end of
+// a cut that is left at speed may be met just behind it.
 // Frames: W. Units: mm, s. Threads: one object a thread; points in path order. Cost: O(1) a point, near kinks of the pieces
 // within a millimetre.
 #pragma once

@@ -129,7 +129,9 @@ class NodeBuilder {
       turning_ += kink.angle;
       kinks_.push_back({here, turning_});
     }
-    const bool own = std::abs(kink.angle) > kKinkNode_rad;
+    const bool turns = std::abs(kink.angle) > kKinkNode_rad;
+    // A slow block beside fast ones: sharing a node, either would be run at the slow one's feed.
+    const bool own = turns || piece.feed_mm_per_s != run_.pieces[i + 1].feed_mm_per_s;
     if (own || here - nodes_.back().offset_mm >= shortest_) {
       if (own && here - nodes_.back().offset_mm < kSamePlace_mm && nodes_.size() > 1) {
         LowerCap(nodes_.back(), kink.speed_mm_per_s, kink.reason);
@@ -142,7 +144,7 @@ class NodeBuilder {
     } else {
       LowerCap(nodes_.back(), kink.speed_mm_per_s, kink.reason);
     }
-    if (own) {
+    if (turns) {
       Hold(here, kink);
     }
     piece_begin_ = nodes_.size();
