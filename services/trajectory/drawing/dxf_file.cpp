@@ -35,7 +35,6 @@ constexpr int kDeepestBlock = 16;
 constexpr std::size_t kMostEntities = 200'000;
 constexpr std::size_t kMostCurves = 2'000'000;
 constexpr int kHighestDegree = 15;
-constexpr double kFlat = 1e-6;  // what may differ in Z
 constexpr double kFarthest_mm = 1e6;
 
 // From the origin, at most.

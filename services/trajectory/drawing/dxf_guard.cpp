@@ -17,7 +17,6 @@ constexpr std::size_t kMostVertices = 32'000;  // the library counts them in 16 
 constexpr std::size_t kMostNumbers =
     (std::size_t{1} << 24) - 16;  // places that single precision still tells apart
 constexpr double kLargestNumber = 1e9;
-constexpr double kFlat = 1e-6;  // what may differ in Z
 constexpr int kExternal = 4 | 8;
 constexpr int kSpatialPolyline = 8;
 

@@ -38,6 +38,9 @@ struct GuardedDxf {
   std::map<std::string, HiddenLayer> hidden_layers;  // by name in upper case
 };
 
+// What Z may differ by in one plane, in the drawing's unit.
+inline constexpr double kFlat = 1e-6;
+
 // The group code that carries the line an entity begins on (a line type scale otherwise, which no contour needs).
 inline constexpr int kLineCarrierCode = 48;
 // And the one that says that a polyline was a light one (a line type's dash otherwise).

@@ -4,7 +4,9 @@
 #include <bit>
 #include <cmath>
 #include <cstdio>
+#include <optional>
 
+#include "trajectory/core/feed/moving_time.hpp"
 #include "trajectory/core/feed/program_path.hpp"
 #include "trajectory/core/feed/reach.hpp"
 #include "trajectory/core/feed/resume.hpp"
@@ -361,6 +363,27 @@ std::uint64_t PlanIdOf(std::string_view program, const PlanOptions& o, const Mac
   return hash.value();
 }
 
+std::optional<ProgramFault> TooLong(const ProgramPath& path) {
+  MovingTime time;
+  for (const PathElement& e : path.elements) {
+    for (const PathPiece& piece : e.pieces) {
+      time.Move(piece.length_mm / piece.feed_mm_per_s, piece.line);
+    }
+    if (e.kind == ElementKind::kGate) {
+      time.StandStill();
+    }
+  }
+  return time.TooLong();
+}
+
+void CheckPath(const ProgramPath& path, const MachineDescription& machine,
+               std::vector<ProgramFault>& faults) {
+  PlaceCheck(machine, faults).Check(path);
+  if (const std::optional<ProgramFault> fault = TooLong(path)) {
+    faults.push_back(*fault);
+  }
+}
+
 ProgramPath LayOutProgram(std::string_view program, const MachineDescription& machine,
                           const PlanOptions& options, std::vector<ProgramFault>& faults) {
   faults = OptionFaults(options);
@@ -374,7 +397,7 @@ ProgramPath LayOutProgram(std::string_view program, const MachineDescription& ma
   }
   ProgramPath path = MakeProgramPath(read.operations, DefaultsOf(machine, options));
   std::vector<Operation>().swap(read.operations);  // a long program's list is not held while it is planned
-  PlaceCheck(machine, faults).Check(path);
+  CheckPath(path, machine, faults);
   TellWords(program, options.notation, faults);
   return path;
 }
@@ -423,7 +446,7 @@ Admission AdmitPartProgram(std::string_view program, const MachineDescription& m
     return admission;
   }
   const ProgramPath path = MakeProgramPath(read.operations, DefaultsOf(machine, options));
-  PlaceCheck(machine, admission.faults).Check(path);
+  CheckPath(path, machine, admission.faults);
   TellWords(program, options.notation, admission.faults);
   admission.cutting_length_mm = path.cut_length_mm;
   admission.pierce_count = path.pierce_count;

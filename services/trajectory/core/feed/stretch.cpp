@@ -6,6 +6,7 @@
 
 #include "trajectory/core/feed/contour_check.hpp"
 #include "trajectory/core/feed/elastic_lead.hpp"
+#include "trajectory/core/feed/moving_time.hpp"
 #include "trajectory/core/feed/reach.hpp"
 #include "trajectory/core/feed/stretch_draft.hpp"
 #include "trajectory/core/feed/stretch_report.hpp"
@@ -53,7 +54,7 @@ class StretchPlanner {
     PrepareElements(model_, draft_, plan_.faults);
     for (int pass = 0; plan_.faults.empty(); ++pass) {
       input_duration_s_ = SetSpeeds(model_, draft_, plan_.faults);
-      if (!plan_.faults.empty() || Cancelled()) {
+      if (!plan_.faults.empty() || Cancelled() || TooLong()) {
         break;
       }
       SampleTime();
@@ -78,6 +79,14 @@ class StretchPlanner {
   }
 
  private:
+  // Slowing may take what the feeds did not.
+  bool TooLong() {
+    if (input_duration_s_ <= kLongestRun_s) {
+      return false;
+    }
+    plan_.faults.push_back(RunTooLong(draft_.elements.front().line, input_duration_s_));
+    return true;
+  }
   bool Cancelled() {
     if (cancelled_ && cancelled_()) {
       plan_.faults.push_back({0, 0, "CANCELLED", "", "planning was cancelled"});

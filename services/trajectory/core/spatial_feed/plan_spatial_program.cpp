@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "kinematics/core/hexapod_singularity.hpp"
+#include "trajectory/core/feed/moving_time.hpp"
 #include "trajectory/core/spatial_feed/spatial_draft.hpp"
 
 namespace lambdajet::trajectory {
@@ -72,33 +73,15 @@ std::uint64_t IdOf(const std::vector<Operation>& operations, const HexapodGeomet
   return hash.value();
 }
 
-constexpr double kLongestProgram_s = 21600.0;
-
-// At programmed feeds; plans are laid out in time, and a feed in the wrong unit would fill any memory.
 std::optional<ProgramFault> TooLong(const SpatialPath& path) {
-  double whole_s = 0.0, longest_run_s = 0.0, longest_s = 0.0;
-  std::uint32_t line = 0;
+  MovingTime time;
   for (const SpatialRun& run : path.runs) {
-    double run_s = 0.0;
     for (const SpatialPiece& piece : run.pieces) {
-      const double piece_s = piece.length_mm / piece.feed_mm_per_s;
-      run_s += piece_s;
-      line = piece_s > longest_s ? piece.line : line;
-      longest_s = std::max(longest_s, piece_s);
+      time.Move(piece.length_mm / piece.feed_mm_per_s, piece.line);
     }
-    longest_run_s = std::max(longest_run_s, run_s);
-    whole_s += run_s;
+    time.StandStill();
   }
-  if (whole_s <= kLongestProgram_s && longest_run_s <= kLongestRun_s) {
-    return std::nullopt;
-  }
-  char text[200];
-  std::snprintf(text, sizeof text,
-                "at its feeds the program moves for %.3g s, this line alone for %.3g s; right is at most "
-                "%.0f s, %.0f s "
-                "without a standstill",
-                whole_s, longest_s, kLongestProgram_s, kLongestRun_s);
-  return ProgramFault{line, 0, "PLAN_TOO_LONG", "", text};
+  return time.TooLong();
 }
 
 class ProgramPlanner {

@@ -7,14 +7,12 @@
 
 #include <vector>
 
+#include "trajectory/core/feed/moving_time.hpp"
 #include "trajectory/core/feed/slow_down.hpp"
 #include "trajectory/core/spatial_feed/spatial_nodes.hpp"
 #include "trajectory/core/spatial_feed/spatial_smoothing.hpp"
 
 namespace lambdajet::trajectory {
-
-// A knot takes some 450 bytes while its run is planned.
-inline constexpr double kLongestRun_s = 7200.0;
 
 class SpatialDraft {
  public:
