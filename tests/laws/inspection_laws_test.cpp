@@ -271,6 +271,21 @@ TEST(Inspection, ASlowCutThatSwingsAndIsMeasuredWithNoiseIsCutEverywhere) {
   }
 }
 
+// A weak drive rings: 0.65 mm either way, a wave every 2.5 mm, so that over half a millimetre the cut leans by 51 degrees.
+TEST(Inspection, ACutThatSwingsWidelyIsCutEverywhere) {
+  const double radius = 30.0 - 0.5 * kKerf, omega = 50.0 / radius;
+  const Truth truth = TruthOf(
+      [=](double t) {
+        const double swing = 0.65 * std::sin(kTurn * radius * omega * t / 2.5);
+        const double r = radius + swing;
+        return Eigen::Vector2d(100.0 + r * std::cos(omega * t), 80.0 + r * std::sin(omega * t));
+      },
+      1.1 * kTurn / omega);
+  const FeatureResult hole = Judge(truth, CircleDrawing(30.0, Side::kInside));
+  EXPECT_EQ(hole.not_cut, 0u);
+  EXPECT_NEAR(hole.max_mm, 0.65, 0.02);
+}
+
 TEST(JoinTruth, DoesNotDependOnBatchesOrOrder) {
   const Truth truth = CircleTruth({100, 80}, 29.7, 0.01);
   const CutPath once = JoinTruth(truth);

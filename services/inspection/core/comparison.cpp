@@ -12,7 +12,8 @@ namespace lambdajet::inspection {
 namespace {
 
 constexpr double kSharpRad = 15.0 * std::numbers::pi / 180.0;
-constexpr double kAligned = 0.7;  // cosine of the largest angle between cut and outline
+constexpr double kAligned = 0.7;   // cosine of the largest angle between cut and outline
+constexpr double kSwinging = 0.5;  // of a cut that swings, where none is aligned
 
 struct OutlinePoint {
   Eigen::Vector2d p;
@@ -84,7 +85,8 @@ struct Crossing {
 
 // Visits each crossing of the point's normal with a piece that runs along the outline.
 template <class Visit>
-void ForEachCrossing(const SegmentGrid& grid, const OutlinePoint& point, double half_kerf_mm, Visit visit) {
+void ForEachCrossing(const SegmentGrid& grid, const OutlinePoint& point, double half_kerf_mm, double aligned,
+                     Visit visit) {
   const Eigen::Vector2d along(point.n.y(), -point.n.x());
   grid.Near(point.p, [&](const CutSegment& s) {
     const double ua = along.dot(s.a - point.p);
@@ -96,7 +98,7 @@ void ForEachCrossing(const SegmentGrid& grid, const OutlinePoint& point, double 
     const double tb = point.n.dot(s.b - point.p);
     const double t = ta + (tb - ta) * ua / (ua - ub);
     const double cosine = along.dot(s.along);
-    if (std::abs(t - half_kerf_mm) <= kSearchMm && std::abs(cosine) >= kAligned) {
+    if (std::abs(t - half_kerf_mm) <= kSearchMm && std::abs(cosine) >= aligned) {
       visit(t, cosine > 0.0 ? 1.0 : -1.0);
     }
   });
@@ -107,7 +109,7 @@ double SenseOfCut(const SegmentGrid& grid, const std::vector<OutlinePoint>& poin
   double votes = 0.0;
   for (const OutlinePoint& point : points) {
     Crossing nearest;
-    ForEachCrossing(grid, point, half_kerf_mm, [&](double t, double sense) {
+    ForEachCrossing(grid, point, half_kerf_mm, kAligned, [&](double t, double sense) {
       if (!nearest.found || std::abs(t - half_kerf_mm) < std::abs(nearest.t_mm - half_kerf_mm)) {
         nearest = {true, t, sense};
       }
@@ -118,9 +120,9 @@ double SenseOfCut(const SegmentGrid& grid, const std::vector<OutlinePoint>& poin
 }
 
 Crossing DeepestCrossing(const SegmentGrid& grid, const OutlinePoint& point, double half_kerf_mm,
-                         double sense) {
+                         double sense, double aligned) {
   Crossing deepest;
-  ForEachCrossing(grid, point, half_kerf_mm, [&](double t, double runs) {
+  ForEachCrossing(grid, point, half_kerf_mm, aligned, [&](double t, double runs) {
     if (runs == sense && (!deepest.found || t < deepest.t_mm)) {
       deepest = {true, t, runs};
     }
@@ -151,7 +153,10 @@ Crossing FindCut(const SegmentGrid& grid, const OutlinePoint& point, double kerf
   if (point.to_corner_mm <= kerf_mm) {
     return NearestCut(grid, point, half);
   }
-  const Crossing crossing = DeepestCrossing(grid, point, half, sense);
+  Crossing crossing = DeepestCrossing(grid, point, half, sense, kAligned);
+  if (!crossing.found) {
+    crossing = DeepestCrossing(grid, point, half, sense, kSwinging);
+  }
   return crossing.found || point.to_corner_mm > kSearchMm ? crossing : NearestCut(grid, point, half);
 }
 

@@ -3,9 +3,9 @@
 //
 // Model: at a point of the outline with its normal n towards the jet's side, the cut's centre line crosses n
 // at t; the edge left standing is at t - kerf/2, and that is the deviation: positive, too much material left.
-// Of several crossings where the cut, over half a millimetre, runs in the feature's sense within 45 degrees and that have
-// their edge within kSearchMm, the one that went deepest into the part made the edge, so lead-ins, overlaps and neighbours do
-// not matter. Within a kerf of a sharp corner, where normals miss, the deviation is the distance to the
+// Of several crossings where the cut, over half a millimetre, runs in the feature's sense within 45 degrees (60, where there is
+// none: a cut may swing) and that have their edge within kSearchMm, the one that went deepest into the part made the edge, so
+// lead-ins, overlaps and neighbours do not matter. Within a kerf of a sharp corner, where normals miss, the deviation is the distance to the
 // centre line minus kerf/2. A point with no cut within reach is NOT_CUT, counted, and fails its feature.
 // Figures are of |deviation| unless they say signed, weighted by length. Nothing is aligned or fitted away.
 // Frames: W. Units: mm. Shapes: deviations in the drawing's order.
