@@ -24,10 +24,6 @@ class HostileProgram {
       "abrasive",  "tangent_arcs", "splines",     "everything"};
 
   std::size_t kind() const { return kind_; }
-  // G61 and G64 P among its blocks.
-  bool ChangesModes() const { return kind_ == 9 || kind_ + 1 == kKinds.size(); }
-  // In blocks shorter than the profile's grid, which run at the slower feed of their ends.
-  bool ChangesFeedInShortBlocks() const { return kind_ == 8; }
   const char* kind_name() const { return kKinds[kind_]; }
 
   std::string Make() {

@@ -37,7 +37,8 @@ void ContourCheck::FindCorners() {
     for (std::size_t k = 1; k < pieces.size(); ++k) {
       const Vector2d u = PointOn(pieces[k - 1], pieces[k - 1].length_mm).tangent;
       const PathPoint here = PointOn(pieces[k], 0.0);
-      if (u.dot(here.tangent) < kCornerCosine) {
+      // Also where a tighter tolerance ends: the places looked at on either side do not speak for it.
+      if (u.dot(here.tangent) < kCornerCosine || pieces[k - 1].tolerance_mm != pieces[k].tolerance_mm) {
         const double s_mm = begin_s_mm + pieces[k].begin_mm;
         corners_.push_back({here.p_mm, s_mm, std::min(s_mm + kCornerLook_mm, end_s_mm),
                             std::min(pieces[k - 1].tolerance_mm, pieces[k].tolerance_mm)});

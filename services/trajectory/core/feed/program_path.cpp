@@ -9,7 +9,9 @@ namespace {
 using Eigen::Vector2d;
 
 constexpr double kShortestMove_mm = 1e-7;
-constexpr double kExactCorner_rad = 5e-3;    // in exact path mode a kink above this is a stop
+constexpr double kExactCorner_rad = 5e-3;  // in exact path mode a kink above this is a stop
+constexpr double kCrawlTolerance_mm =
+    2e-3;  // tighter than this times sin(kink / 2) crossing takes longer than a stop
 constexpr double kExactTolerance_mm = 2e-3;  // contour tolerance between the stops of exact path mode
 
 Vector2d Turned(const Vector2d& v) { return {-v.y(), v.x()}; }
@@ -135,7 +137,7 @@ class PathBuilder {
   }
 
   void AddPiece(PathPiece& piece, const Operation& o, const Vector2d& to) {
-    if (run_ && exact_ && Kink(run_element().pieces.back(), piece) > kExactCorner_rad) {
+    if (run_ && StopsBetween(run_element().pieces.back(), piece)) {
       run_element().flush_after = true;
       CloseRun();
     }
@@ -153,6 +155,15 @@ class PathBuilder {
     element.to_mm = position_ = to;
     moved_ = true;
     path_.cut_length_mm += jet_on_ ? piece.length_mm : 0.0;
+  }
+
+  bool StopsBetween(const PathPiece& before, const PathPiece& piece) const {
+    if (exact_) {
+      return Kink(before, piece) > kExactCorner_rad;
+    }
+    const double tolerance_mm = std::min(before.tolerance_mm, tolerance_mm_);
+    return tolerance_mm < kCrawlTolerance_mm &&
+           tolerance_mm < kCrawlTolerance_mm * std::sin(0.5 * Kink(before, piece));
   }
 
   static double Kink(const PathPiece& a, const PathPiece& b) {

@@ -1,8 +1,8 @@
 // Turns a canonical operation list into geometry: runs of lines and arcs along which the feed is planned, idle moves between
 // them, gates at standstill and events keyed to the path.
 //
-// Model: a run is what is cut (or moved at feed) without a stop; it ends where a gate, an idle move, an exact corner (G61) or
-// the program's end stands. Frames: W. Units: mm, mm/s, rad. Threads: values and pure functions.
+// Model: a run is what is cut (or moved at feed) without a stop; it ends where a gate, an idle move, an exact corner (G61, or a
+// tolerance of micrometres, within which a corner would be crossed more slowly than a stop) or the program's end stands. Frames: W. Units: mm, mm/s, rad. Threads: values and pure functions.
 #pragma once
 
 #include <Eigen/Core>

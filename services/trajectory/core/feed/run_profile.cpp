@@ -21,6 +21,7 @@ constexpr double kShareOfTolerance = 0.9;  // that a corner may use up
 constexpr double kShortestNear_mm = 0.02;
 constexpr double kSamePlace_mm = 1e-3;
 constexpr int kFewestCells = 4;
+constexpr double kWorthANode = 1.1;                               // of speed
 constexpr std::array<double, 3> kNearEnds_mm = {0.03, 0.1, 0.3};  // where speed changes fast over little way
 
 struct SmallKink {
@@ -66,9 +67,13 @@ class NodeBuilder {
       cell = std::clamp(kCellOfRadius * std::abs(piece.radius_mm), shortest_, longest_);
     }
     if (piece.length_mm < 2.0 * shortest_) {
+      if (Rises(i, before, after)) {
+        AddInside(i, 0.5 * piece.length_mm);
+      }
       return;
     }
-    const int count = static_cast<int>(std::ceil(piece.length_mm / cell));
+    int count = static_cast<int>(std::ceil(piece.length_mm / cell));
+    count += count % 2 == 1 && Rises(i, before, after) ? 1 : 0;
     const double step = piece.length_mm / count;
     const double most = count > 1 ? step : 0.5 * piece.length_mm;  // that ends' own nodes reach
     const bool fine = step > 2.0 * kNearEnds_mm.back();
@@ -79,6 +84,19 @@ class NodeBuilder {
     NearEnd(i, after.hold_mm, fine, most, [&](double near) { return piece.length_mm - near; });
     std::sort(nodes_.begin() + static_cast<std::ptrdiff_t>(piece_begin_), nodes_.end(),
               [](const ProfileNode& a, const ProfileNode& b) { return a.offset_mm < b.offset_mm; });
+  }
+
+  // Whether the middle of a piece can be passed faster than its ends: it needs a node then, else the piece is driven from one
+  // end's speed to the other's.
+  bool Rises(std::size_t i, const Kink& before, const Kink& after) const {
+    const PathPiece& piece = run_.pieces[i];
+    const double from = i == 0 ? 0.0 : before.speed_mm_per_s;
+    const double to = i + 1 == run_.pieces.size() ? 0.0 : after.speed_mm_per_s;
+    const double held_mm = (i == 0 ? 0.0 : before.hold_mm) + after.hold_mm;
+    const double way_mm = piece.length_mm - held_mm;
+    const double ends = std::min(from, to), faster = kWorthANode * std::max(from, to);
+    return faster < piece.feed_mm_per_s && way_mm > kSamePlace_mm &&
+           ends * ends + model_.path_acceleration_mm_per_s2 * way_mm > faster * faster;
   }
 
   // Where a kink's speed is no longer kept, and where speed changes fast.

@@ -20,12 +20,22 @@ constexpr double kSmoothKink = 0.35;       // below this it counts as bend of a 
 constexpr double kTurningWindow_mm = 0.5;  // either side
 constexpr double kSamePlace_mm = 1e-3;
 constexpr int kFewestCells = 4;
+constexpr double kWorthANode = 1.1;  // of speed
 constexpr std::size_t kMostFaults = 20;
 constexpr std::array<double, 3> kNearEnds_mm = {0.03, 0.1, 0.3};  // where speed changes fast over little way
 
-struct Kink {
+struct SmallKink {
   double offset_mm;
   Vector6d turning;  // prefix sum of small changes of direction up to and with this kink
+};
+
+// How the place between two pieces is crossed.
+struct Kink {
+  Vector6d change = Vector6d::Zero();  // of direction
+  double size = 0.0;
+  double bend = 0.0;  // of the piece that comes in
+  double speed_mm_per_s = 0.0;
+  FeedLimit reason = FeedLimit::kFeed;
 };
 
 class NodeBuilder {
@@ -37,9 +47,12 @@ class NodeBuilder {
     longest_ = std::min(kLongestCell_mm, run_.length_mm() / kFewestCells);
     shortest_ = std::min(kShortestCell_mm, 0.5 * longest_);
     AddNode(0, 0.0, run_.pieces.front().feed_mm_per_s, FeedLimit::kFeed);
+    Kink before, after;
     for (std::size_t i = 0; i < run_.pieces.size(); ++i) {
-      Inside(i);
-      Join(i);
+      after = i + 1 < run_.pieces.size() ? KinkAfter(i) : Kink{};
+      Inside(i, before, after);
+      Join(i, after);
+      before = after;
     }
     for (std::size_t n = 0; n < nodes_.size() && faults_.size() < kMostFaults; ++n) {
       SetMotion(n);
@@ -48,14 +61,20 @@ class NodeBuilder {
   }
 
  private:
-  void Inside(std::size_t i) {
+  // Nodes strictly inside a piece.
+  void Inside(std::size_t i, const Kink& before, const Kink& after) {
     const SpatialPiece& piece = run_.pieces[i];
+    const bool rises = Rises(piece, before.speed_mm_per_s, after.speed_mm_per_s);
     if (piece.length_mm < 2.0 * shortest_) {
+      if (rises) {
+        AddNode(i, 0.5 * piece.length_mm, piece.feed_mm_per_s, FeedLimit::kFeed);
+      }
       return;
     }
     const double bend = PointOn(piece, 0.0).bend.norm();
     const double cell = bend > 0.0 ? std::clamp(kCellOfRadius / bend, shortest_, longest_) : longest_;
-    const int count = static_cast<int>(std::ceil(piece.length_mm / cell));
+    int count = static_cast<int>(std::ceil(piece.length_mm / cell));
+    count += rises && count % 2 == 1 ? 1 : 0;
     const double step = piece.length_mm / count;
     const bool fine = step > 2.0 * kNearEnds_mm.back();
     for (std::size_t k = 0; fine && k < kNearEnds_mm.size(); ++k) {
@@ -69,35 +88,49 @@ class NodeBuilder {
     }
   }
 
+  // Whether the middle of a piece can be passed faster than its ends: it needs a node then, else the piece is driven from one
+  // end's speed to the other's.
+  bool Rises(const SpatialPiece& piece, double from_mm_per_s, double to_mm_per_s) const {
+    const double ends = std::min(from_mm_per_s, to_mm_per_s);
+    const double faster = kWorthANode * std::max(from_mm_per_s, to_mm_per_s);
+    return faster < piece.feed_mm_per_s && piece.length_mm > kSamePlace_mm &&
+           ends * ends + model_.path_acceleration_mm_per_s2 * piece.length_mm > faster * faster;
+  }
+
+  Kink KinkAfter(std::size_t i) const {
+    const SpatialPiece &piece = run_.pieces[i], &next = run_.pieces[i + 1];
+    const SpatialPoint u = PointOn(piece, piece.length_mm), v = PointOn(next, 0.0);
+    Kink kink;
+    kink.change << v.tangent - u.tangent, v.turn - u.turn;
+    kink.size = Size(kink.change);
+    kink.bend = u.bend.norm();
+    kink.speed_mm_per_s = std::min(piece.feed_mm_per_s, next.feed_mm_per_s);
+    LimitKink(u, v, std::min(piece.tolerance_mm, next.tolerance_mm), kink);
+    return kink;
+  }
+
   // The place between piece i and the next, or the end.
-  void Join(std::size_t i) {
+  void Join(std::size_t i, const Kink& kink) {
     const SpatialPiece& piece = run_.pieces[i];
     const double here = piece.begin_mm + piece.length_mm;
     if (i + 1 == run_.pieces.size()) {
       AddNode(i, piece.length_mm, piece.feed_mm_per_s, FeedLimit::kFeed);
       return;
     }
-    const SpatialPiece& next = run_.pieces[i + 1];
-    const SpatialPoint u = PointOn(piece, piece.length_mm), v = PointOn(next, 0.0);
-    Vector6d change;
-    change << v.tangent - u.tangent, v.turn - u.turn;
-    const double size = Size(change);
-    if (size < kSmoothKink && size > 1e-9) {
-      turning_ += change;
+    if (kink.size < kSmoothKink && kink.size > 1e-9) {
+      turning_ += kink.change;
       kinks_.push_back({here, turning_});
     }
-    double speed = std::min(piece.feed_mm_per_s, next.feed_mm_per_s);
-    FeedLimit reason = FeedLimit::kFeed;
-    LimitKink(u, v, change, std::min(piece.tolerance_mm, next.tolerance_mm), speed, reason);
-    const bool own = size > kKinkNode;
+    // A slow block beside fast ones: sharing a node, either would be run at the slow one's feed.
+    const bool own = kink.size > kKinkNode || piece.feed_mm_per_s != run_.pieces[i + 1].feed_mm_per_s;
     const bool near = here - nodes_.back().offset_mm < (own ? kSamePlace_mm : shortest_);
     if (near && nodes_.size() > 1) {
-      LowerCap(nodes_.back(), speed, reason);
+      LowerCap(nodes_.back(), kink.speed_mm_per_s, kink.reason);
       return;
     }
-    AddNode(i + 1, 0.0, speed, reason);
+    AddNode(i + 1, 0.0, kink.speed_mm_per_s, kink.reason);
     // The incoming piece's curvature holds up to here.
-    nodes_.back().curvature = std::max(nodes_.back().curvature, u.bend.norm() * model_.overshoot);
+    nodes_.back().curvature = std::max(nodes_.back().curvature, kink.bend * model_.overshoot);
     nodes_.back().speed_cap_mm_per_s = std::min(nodes_.back().speed_cap_mm_per_s, piece.feed_mm_per_s);
   }
 
@@ -113,13 +146,13 @@ class NodeBuilder {
     }
   }
 
-  void LimitKink(const SpatialPoint& u, const SpatialPoint& v, const Vector6d& change, double tolerance_mm,
-                 double& speed, FeedLimit& reason) const {
-    const double size = Size(change);
+  void LimitKink(const SpatialPoint& u, const SpatialPoint& v, double tolerance_mm, Kink& kink) const {
+    const Vector6d& change = kink.change;
+    const double size = kink.size;
     const auto lower = [&](double limit) {
-      if (limit < speed) {
-        speed = limit;
-        reason = FeedLimit::kCorner;
+      if (limit < kink.speed_mm_per_s) {
+        kink.speed_mm_per_s = limit;
+        kink.reason = FeedLimit::kCorner;
       }
     };
     const double deviation_s = model_.kink_deviation_s;
@@ -195,7 +228,7 @@ class NodeBuilder {
   std::vector<ProgramFault>& faults_;
   std::vector<SpatialNode> nodes_;
   std::vector<Place> places_;
-  std::vector<Kink> kinks_;
+  std::vector<SmallKink> kinks_;
   Vector6d turning_ = Vector6d::Zero();
   std::size_t from_ = 0, to_ = 0;
   double longest_ = kLongestCell_mm;

@@ -2,7 +2,8 @@
 //
 // Model: on straight blocks a node a millimetre of path length, on arcs also a tenth of the radius of curvature; blocks
 // shorter than a node's distance share a node, their bend is the net change of direction over a millimetre, as a vector in
-// six dimensions. Corners are slowed so that the smoothing's deviation stays within both tolerances and the change of
+// six dimensions; a node stands where the feed changes, and in the middle of a block, however short, that can be driven faster
+// than its ends. Corners are slowed so that the smoothing's deviation stays within both tolerances and the change of
 // velocity within what path and struts can do during the first average. Every node's reach is checked.
 // Frames: W. Units: mm, rad, s. Threads: pure. Cost: about 10 us a node.
 #pragma once
