@@ -5,6 +5,7 @@
 #include <optional>
 #include <utility>
 
+#include "foundation/motion/plan_batches.hpp"
 #include "lambdajet/calibration/v1/machine_description.schema.hpp"
 #include "lambdajet/calibration/v1/machine_descriptionPubSubTypes.h"
 #include "lambdajet/cell/v1/command.schema.hpp"
@@ -17,7 +18,7 @@
 #include "lambdajet/plant/v1/truthPubSubTypes.h"
 #include "lambdajet/trajectory/v1/plan.schema.hpp"
 #include "lambdajet/trajectory/v1/planPubSubTypes.h"
-#include "link/bus/link_wire.hpp"
+#include "link/wire/link_wire.hpp"
 #include "platform/bus/participant.hpp"
 #include "platform/bus/reader.hpp"
 #include "platform/bus/writer.hpp"
@@ -264,14 +265,7 @@ void BusCell::Stream() {
         wish.next_segment < plan_.segments.size()) {
       SegmentBatch batch;
       batch.header = {wires_->session, ++wires_->segments_sent, now_ns()};
-      batch.plan = plan_.id;
-      batch.segment_count = static_cast<std::uint32_t>(plan_.segments.size());
-      batch.elastic_lag_s2 = plan_.elastic_lag_s2;
-      batch.duration_s = plan_.duration_s;
-      for (std::uint32_t i = wish.next_segment; i < plan_.segments.size() && batch.count < kSegmentsPerBatch;
-           ++i) {
-        batch.segments[batch.count++] = plan_.segments[i];
-      }
+      FillBatch(plan_, {wish.next_segment, kSegmentsPerBatch}, batch);
       link::ToWire(batch, segment_wire);
       wires_->segment->Write(segment_wire);
     }
@@ -280,17 +274,9 @@ void BusCell::Stream() {
     if (streaming_.load() && motion.plan == plan_.id && !all) {
       ProcessBatch batch;
       batch.header = {wires_->session, ++wires_->process_sent, now_ns()};
-      batch.plan = plan_.id;
-      batch.gate_total = static_cast<std::uint32_t>(plan_.gates.size());
-      batch.event_total = static_cast<std::uint32_t>(plan_.events.size());
-      for (std::size_t i = motion.next_gate - 1; i < plan_.gates.size() && batch.gate_count < kEventsPerBatch;
-           ++i) {
-        batch.gates[batch.gate_count++] = plan_.gates[i];
-      }
-      for (std::size_t i = motion.next_event; i < plan_.events.size() && batch.event_count < kEventsPerBatch;
-           ++i) {
-        batch.events[batch.event_count++] = plan_.events[i];
-      }
+      FillBatch(plan_,
+                ProcessRange{{motion.next_gate, kEventsPerBatch}, {motion.next_event, kEventsPerBatch}},
+                batch);
       link::ToWire(batch, process_wire);
       wires_->process->Write(process_wire);
     }

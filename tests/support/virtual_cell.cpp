@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <chrono>
 
+#include "foundation/motion/plan_batches.hpp"
+
 namespace lambdajet::tests {
 namespace {
 
@@ -247,14 +249,7 @@ void VirtualCell::StreamSegments() {
     return;
   }
   SegmentBatch batch;
-  batch.plan = plan_.id;
-  batch.segment_count = static_cast<std::uint32_t>(plan_.segments.size());
-  batch.elastic_lag_s2 = plan_.elastic_lag_s2;
-  batch.duration_s = plan_.duration_s;
-  for (std::uint32_t i = wish.next_segment; i < plan_.segments.size() && batch.count < kSegmentsPerBatch;
-       ++i) {
-    batch.segments[batch.count++] = plan_.segments[i];
-  }
+  FillBatch(plan_, {wish.next_segment, kSegmentsPerBatch}, batch);
   if (batch.count > 0) {
     batch.header = {kTrajectorySession, ++segment_sequence_, now_ns_};
     Post(segments_to_drive_, batch);
@@ -270,16 +265,8 @@ void VirtualCell::StreamProcess() {
   }
   ProcessBatch batch;
   batch.header = {kTrajectorySession, ++process_sequence_, now_ns_};
-  batch.plan = plan_.id;
-  batch.gate_total = static_cast<std::uint32_t>(plan_.gates.size());
-  batch.event_total = static_cast<std::uint32_t>(plan_.events.size());
-  for (std::size_t i = wish.next_gate - 1; i < plan_.gates.size() && batch.gate_count < kEventsPerBatch;
-       ++i) {
-    batch.gates[batch.gate_count++] = plan_.gates[i];
-  }
-  for (std::size_t i = wish.next_event; i < plan_.events.size() && batch.event_count < kEventsPerBatch; ++i) {
-    batch.events[batch.event_count++] = plan_.events[i];
-  }
+  FillBatch(plan_, ProcessRange{{wish.next_gate, kEventsPerBatch}, {wish.next_event, kEventsPerBatch}},
+            batch);
   Post(process_to_drive_, batch);
   Post(process_to_main_, batch);
 }

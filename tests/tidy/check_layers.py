@@ -73,6 +73,8 @@ def door_fault(house, room, header, houses):
             return None
         if head == "simulated_plant" and house in ("drive", "main_motion") and room in ("", "simulation"):
             return None  # the node's main introduces its plant
+        if head == "link" and rest.startswith("wire/") and room == "bus":
+            return None  # a sample of the link has one translation, for all who send or read it
         if head == "link" and house in ("drive", "main_motion"):
             return None  # what the doors of both machine modules share
         return f"the {house} house includes the {head} house; only cores named in services/README.md may be shared"

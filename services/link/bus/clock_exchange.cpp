@@ -9,7 +9,7 @@
 #include "lambdajet/link/v1/header.h"
 #include "lambdajet/link/v1/header.schema.hpp"
 #include "lambdajet/link/v1/headerPubSubTypes.h"
-#include "link/bus/link_wire.hpp"
+#include "link/wire/link_wire.hpp"
 #include "platform/bus/reader.hpp"
 #include "platform/bus/writer.hpp"
 #include "platform/process/common_clock.hpp"

@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include "link/bus/link_wire.hpp"
+#include "link/wire/link_wire.hpp"
 #include "platform/bus/reader.hpp"
 #include "platform/bus/sample_slots.hpp"
 

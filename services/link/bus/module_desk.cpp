@@ -17,7 +17,7 @@
 #include "lambdajet/main_motion/v1/statePubSubTypes.h"
 #include "link/bus/clock_exchange.hpp"
 #include "link/bus/description_wire.hpp"
-#include "link/bus/link_wire.hpp"
+#include "link/wire/link_wire.hpp"
 #include "platform/bus/reader.hpp"
 #include "platform/bus/sample_slots.hpp"
 #include "platform/bus/writer.hpp"

@@ -1,9 +1,9 @@
 #include "trajectory/bus/plan_streamer.hpp"
 
-#include <algorithm>
 #include <optional>
 #include <thread>
 
+#include "foundation/motion/plan_batches.hpp"
 #include "lambdajet/drive/v1/state.h"
 #include "lambdajet/drive/v1/state.schema.hpp"
 #include "lambdajet/drive/v1/statePubSubTypes.h"
@@ -13,6 +13,7 @@
 #include "lambdajet/trajectory/v1/plan.h"
 #include "lambdajet/trajectory/v1/plan.schema.hpp"
 #include "lambdajet/trajectory/v1/planPubSubTypes.h"
+#include "link/wire/link_wire.hpp"
 #include "platform/bus/participant.hpp"
 #include "platform/bus/reader.hpp"
 #include "platform/bus/sample_slots.hpp"
@@ -33,50 +34,15 @@ constexpr std::int64_t kPeriod_ns = 5'000'000;
 constexpr std::int64_t kFresh_ns = 200'000'000;
 constexpr int kMostBatchesPerTurn = 4;
 
-void ToWire(const Segment& segment, plan_wire::Segment& to) {
-  to.index(segment.index);
-  to.start_s(segment.start_s);
-  to.duration_s(segment.duration_s);
-  for (std::size_t a = 0; a < kActuatorCount; ++a) {
-    for (std::size_t c = 0; c < kPolynomialSize; ++c) {
-      to.q_mm()[a * kPolynomialSize + c] = segment.q_mm[a].c[c];
-      to.lead_mm()[a * kPolynomialSize + c] = segment.lead_mm[a].c[c];
-    }
-  }
-  for (std::size_t c = 0; c < kPolynomialSize; ++c) {
-    to.s_mm()[c] = segment.s_mm.c[c];
-  }
-  to.gate_at_end(segment.gate_at_end);
-}
-
-void ToWire(const Gate& gate, plan_wire::Gate& to) {
-  to.id(gate.id);
-  to.kind(static_cast<std::uint32_t>(gate.kind));
-  to.s_mm(gate.s_mm);
-  to.argument(gate.argument);
-  to.input(static_cast<std::uint32_t>(gate.condition.input()));
-  to.input_event(static_cast<std::uint32_t>(gate.condition.event()));
-}
-
-void ToWire(const ProcessEvent& event, plan_wire::ProcessEvent& to) {
-  to.index(event.index);
-  to.action(static_cast<std::uint32_t>(event.action));
-  to.s_mm(event.s_mm);
-  to.argument(event.argument);
-}
-
 }  // namespace
 
 struct PlanStreamer::Link {
   explicit Link(const Clock& common_clock) : clock(common_clock) {}
 
-  void NextHeader(idl::link::v1::Header& header, std::uint64_t& number) const {
-    header.session(session);
-    header.sequence_number(++number);
-    header.time_ns(clock.now_ns());
-  }
+  SampleHeader NextHeader(std::uint64_t& number) const { return {session, ++number, clock.now_ns()}; }
 
-  bool WriteProcess(const Range& gates, const Range& events);
+  bool WriteSegments(const PlanRange& range);
+  bool WriteProcess(const ProcessRange& range);
 
   const Clock& clock;
   std::uint64_t session = 0;
@@ -97,26 +63,30 @@ struct PlanStreamer::Link {
   std::uint64_t resent_counted = 0;
   std::uint64_t gates_sent_to = 0;  // session of the drive
   std::size_t gates_sent = 0;
-  plan_wire::SegmentBatch segment_batch;
-  plan_wire::ProcessBatch process_batch;
+  SegmentBatch segment_batch;
+  ProcessBatch process_batch;
+  plan_wire::SegmentBatch segment_wire;
+  plan_wire::ProcessBatch process_wire;
   std::thread loop;
 };
 
-bool PlanStreamer::Link::WriteProcess(const Range& gates, const Range& events) {
-  plan_wire::ProcessBatch& batch = process_batch;
-  NextHeader(batch.header(), process_number);
-  batch.plan(plan->id);
-  batch.gate_total(static_cast<std::uint32_t>(plan->gates.size()));
-  batch.event_total(static_cast<std::uint32_t>(plan->events.size()));
-  batch.gate_count(gates.count);
-  for (std::uint32_t k = 0; k < gates.count; ++k) {
-    ToWire(plan->gates[gates.first - 1 + k], batch.gates()[k]);
+bool PlanStreamer::Link::WriteSegments(const PlanRange& range) {
+  segment_batch.header = NextHeader(segment_number);
+  FillBatch(*plan, range, segment_batch);
+  link::ToWire(segment_batch, segment_wire);
+  if (segments->Write(segment_wire)) {
+    return true;
   }
-  batch.event_count(events.count);
-  for (std::uint32_t k = 0; k < events.count; ++k) {
-    ToWire(plan->events[events.first + k], batch.events()[k]);
-  }
-  if (process->Write(batch)) {
+  --segment_number;
+  refused.Increment();
+  return false;
+}
+
+bool PlanStreamer::Link::WriteProcess(const ProcessRange& range) {
+  process_batch.header = NextHeader(process_number);
+  FillBatch(*plan, range, process_batch);
+  link::ToWire(process_batch, process_wire);
+  if (process->Write(process_wire)) {
     return true;
   }
   --process_number;
@@ -225,19 +195,7 @@ void PlanStreamer::SendSegments(std::int64_t now_ns) {
     if (!range) {
       break;
     }
-    plan_wire::SegmentBatch& batch = link.segment_batch;
-    link.NextHeader(batch.header(), link.segment_number);
-    batch.plan(link.plan->id);
-    batch.segment_count(static_cast<std::uint32_t>(link.plan->segments.size()));
-    batch.elastic_lag_s2(link.plan->elastic_lag_s2);
-    batch.duration_s(link.plan->duration_s);
-    batch.count(range->count);
-    for (std::uint32_t k = 0; k < range->count; ++k) {
-      ToWire(link.plan->segments[range->first + k], batch.segments()[k]);
-    }
-    if (!link.segments->Write(batch)) {
-      --link.segment_number;
-      link.refused.Increment();
+    if (!link.WriteSegments(*range)) {
       break;
     }
     link.segment_pacer.Sent(*range, now_ns);
@@ -256,12 +214,11 @@ void PlanStreamer::SendGatesToDrive(std::uint64_t drive_session) {
   }
   const std::vector<Gate>& gates = link.plan->gates;
   while (link.gates_sent < gates.size()) {
-    const Range range{static_cast<std::uint32_t>(link.gates_sent) + 1,
-                      static_cast<std::uint32_t>(std::min<std::size_t>(32, gates.size() - link.gates_sent))};
-    if (!link.WriteProcess(range, {})) {
+    const PlanRange range{static_cast<std::uint32_t>(link.gates_sent) + 1, kEventsPerBatch};
+    if (!link.WriteProcess({.gates = range, .events = {}})) {
       return;
     }
-    link.gates_sent += range.count;
+    link.gates_sent += link.process_batch.gate_count;
   }
 }
 
@@ -279,7 +236,7 @@ void PlanStreamer::SendProcess(std::int64_t now_ns) {
   }
   const ProcessWish wish{motion->first.plan(), motion->first.next_event(), motion->first.next_gate()};
   const auto range = link.process_pacer.Next(*link.plan, wish, now_ns);
-  if (range && link.WriteProcess(range->gates, range->events)) {
+  if (range && link.WriteProcess(*range)) {
     link.process_pacer.Sent(wish, now_ns);
   }
 }

@@ -4,7 +4,7 @@
 
 namespace lambdajet::trajectory {
 
-std::optional<Range> SegmentPacer::Next(const Plan& plan, const DriveWish& wish, std::int64_t now_ns) {
+std::optional<PlanRange> SegmentPacer::Next(const Plan& plan, const DriveWish& wish, std::int64_t now_ns) {
   const auto total = static_cast<std::uint32_t>(plan.segments.size());
   if (wish.plan != plan.id || wish.next_segment >= total) {
     return std::nullopt;
@@ -24,10 +24,10 @@ std::optional<Range> SegmentPacer::Next(const Plan& plan, const DriveWish& wish,
   if (sent_ >= total || plan.segments[sent_].start_s > wish.tau_s + limits_.ahead_s) {
     return std::nullopt;
   }
-  return Range{sent_, std::min(limits_.per_batch, total - sent_)};
+  return PlanRange{sent_, std::min(limits_.per_batch, total - sent_)};
 }
 
-void SegmentPacer::Sent(const Range& range, std::int64_t now_ns) {
+void SegmentPacer::Sent(const PlanRange& range, std::int64_t now_ns) {
   if (sent_ == wish_) {
     moved_ns_ = now_ns;
   }

@@ -11,18 +11,14 @@
 #include <optional>
 
 #include "foundation/motion/plan.hpp"
+#include "foundation/motion/plan_batches.hpp"
 
 namespace lambdajet::trajectory {
 
 struct PacerLimits {
   double ahead_s = 2.0;
   std::int64_t patience_ns = 60'000'000;
-  std::uint32_t per_batch = 8;
-};
-
-struct Range {
-  std::uint32_t first = 0;
-  std::uint32_t count = 0;
+  std::uint32_t per_batch = kSegmentsPerBatch;
 };
 
 // What the drive says of itself.
@@ -37,8 +33,8 @@ class SegmentPacer {
   explicit SegmentPacer(const PacerLimits& limits = {}) : limits_(limits) {}
 
   // The next batch, or nothing for now. The caller says Sent() when it went out.
-  std::optional<Range> Next(const Plan& plan, const DriveWish& wish, std::int64_t now_ns);
-  void Sent(const Range& range, std::int64_t now_ns);
+  std::optional<PlanRange> Next(const Plan& plan, const DriveWish& wish, std::int64_t now_ns);
+  void Sent(const PlanRange& range, std::int64_t now_ns);
 
   std::uint64_t resent() const { return resent_; }
 
@@ -57,14 +53,9 @@ struct ProcessWish {
   std::uint32_t next_gate = 1;
 };
 
-struct ProcessRange {
-  Range gates;  // by id, from 1
-  Range events;
-};
-
 class ProcessPacer {
  public:
-  explicit ProcessPacer(const PacerLimits& limits = {.per_batch = 32}) : limits_(limits) {}
+  explicit ProcessPacer(const PacerLimits& limits = {.per_batch = kEventsPerBatch}) : limits_(limits) {}
 
   std::optional<ProcessRange> Next(const Plan& plan, const ProcessWish& wish, std::int64_t now_ns);
   void Sent(const ProcessWish& wish, std::int64_t now_ns);

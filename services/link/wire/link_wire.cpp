@@ -1,10 +1,11 @@
-#include "link/bus/link_wire.hpp"
+#include "link/wire/link_wire.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <initializer_list>
 
+#include "foundation/contract/expects.hpp"
 #include "lambdajet/cell/v1/command.h"
 #include "lambdajet/drive/v1/state.h"
 #include "lambdajet/link/v1/header.h"
@@ -82,33 +83,72 @@ bool TakeCondition(const idl::trajectory::v1::Gate& wire, GateKind kind, InputCo
 }
 
 void ToWire(const Segment& segment, idl::trajectory::v1::Segment& wire) {
-  wire.index(segment.index);
-  wire.start_s(segment.start_s);
-  wire.duration_s(segment.duration_s);
+  const auto& [index, start_s, duration_s, q_mm, lead_mm, s_mm, gate_at_end] = segment;
+  wire.index(index);
+  wire.start_s(start_s);
+  wire.duration_s(duration_s);
   for (std::size_t a = 0; a < kActuatorCount; ++a) {
     for (std::size_t c = 0; c < kPolynomialSize; ++c) {
-      wire.q_mm()[a * kPolynomialSize + c] = segment.q_mm[a].c[c];
-      wire.lead_mm()[a * kPolynomialSize + c] = segment.lead_mm[a].c[c];
+      wire.q_mm()[a * kPolynomialSize + c] = q_mm[a].c[c];
+      wire.lead_mm()[a * kPolynomialSize + c] = lead_mm[a].c[c];
     }
   }
-  std::copy(segment.s_mm.c.begin(), segment.s_mm.c.end(), wire.s_mm().begin());
-  wire.gate_at_end(segment.gate_at_end);
+  wire.s_mm() = s_mm.c;
+  wire.gate_at_end(gate_at_end);
 }
 
 bool FromWire(const idl::trajectory::v1::Segment& wire, Segment& segment) {
-  segment.index = wire.index();
-  segment.start_s = wire.start_s();
-  segment.duration_s = wire.duration_s();
+  auto& [index, start_s, duration_s, q_mm, lead_mm, s_mm, gate_at_end] = segment;
+  index = wire.index();
+  start_s = wire.start_s();
+  duration_s = wire.duration_s();
   for (std::size_t a = 0; a < kActuatorCount; ++a) {
     for (std::size_t c = 0; c < kPolynomialSize; ++c) {
-      segment.q_mm[a].c[c] = wire.q_mm()[a * kPolynomialSize + c];
-      segment.lead_mm[a].c[c] = wire.lead_mm()[a * kPolynomialSize + c];
+      q_mm[a].c[c] = wire.q_mm()[a * kPolynomialSize + c];
+      lead_mm[a].c[c] = wire.lead_mm()[a * kPolynomialSize + c];
     }
   }
-  std::copy(wire.s_mm().begin(), wire.s_mm().end(), segment.s_mm.c.begin());
-  segment.gate_at_end = wire.gate_at_end();
-  return Finite({segment.start_s, segment.duration_s}) && AllFinite(wire.q_mm()) &&
-         AllFinite(wire.lead_mm()) && AllFinite(wire.s_mm());
+  s_mm.c = wire.s_mm();
+  gate_at_end = wire.gate_at_end();
+  return Finite({start_s, duration_s}) && AllFinite(wire.q_mm()) && AllFinite(wire.lead_mm()) &&
+         AllFinite(wire.s_mm());
+}
+
+void ToWire(const Gate& gate, idl::trajectory::v1::Gate& wire) {
+  const auto& [id, kind, s_mm, argument, source_line, condition] = gate;
+  wire.id(id);
+  wire.kind(Number(kind));
+  wire.s_mm(s_mm);
+  wire.argument(argument);
+  wire.input(Number(condition.input()));
+  wire.input_event(Number(condition.event()));
+}
+
+bool FromWire(const idl::trajectory::v1::Gate& wire, Gate& gate) {
+  auto& [id, kind, s_mm, argument, source_line, condition] = gate;
+  id = wire.id();
+  s_mm = wire.s_mm();
+  argument = wire.argument();
+  source_line = 0;
+  return Take(wire.kind(), kGateKinds, kind) && TakeCondition(wire, kind, condition) &&
+         Finite({s_mm, argument});
+}
+
+void ToWire(const ProcessEvent& event, idl::trajectory::v1::ProcessEvent& wire) {
+  const auto& [index, action, s_mm, argument, source_line] = event;
+  wire.index(index);
+  wire.action(Number(action));
+  wire.s_mm(s_mm);
+  wire.argument(argument);
+}
+
+bool FromWire(const idl::trajectory::v1::ProcessEvent& wire, ProcessEvent& event) {
+  auto& [index, action, s_mm, argument, source_line] = event;
+  index = wire.index();
+  s_mm = wire.s_mm();
+  argument = wire.argument();
+  source_line = 0;
+  return Take(wire.action(), kActions, action) && Finite({s_mm, argument});
 }
 
 }  // namespace
@@ -328,86 +368,72 @@ bool FromWire(const idl::cell::v1::Command& wire, ModuleCommand& sample) {
 }
 
 void ToWire(const SegmentBatch& sample, idl::trajectory::v1::SegmentBatch& wire) {
-  ToWire(sample.header, wire.header());
-  wire.plan(sample.plan);
-  wire.segment_count(sample.segment_count);
-  wire.elastic_lag_s2(sample.elastic_lag_s2);
-  wire.duration_s(sample.duration_s);
-  wire.count(sample.count);
-  for (std::size_t i = 0; i < sample.count; ++i) {
-    ToWire(sample.segments[i], wire.segments()[i]);
+  const auto& [header, plan, segment_count, elastic_lag_s2, duration_s, count, segments] = sample;
+  Expects(count <= kSegmentsPerBatch, "a batch of segments holds no more than its array");
+  ToWire(header, wire.header());
+  wire.plan(plan);
+  wire.segment_count(segment_count);
+  wire.elastic_lag_s2(elastic_lag_s2);
+  wire.duration_s(duration_s);
+  wire.count(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    ToWire(segments[i], wire.segments()[i]);
   }
 }
 
 bool FromWire(const idl::trajectory::v1::SegmentBatch& wire, SegmentBatch& sample) {
-  sample.header = FromWire(wire.header());
-  sample.plan = wire.plan();
-  sample.segment_count = wire.segment_count();
-  sample.elastic_lag_s2 = wire.elastic_lag_s2();
-  sample.duration_s = wire.duration_s();
-  sample.count = wire.count();
-  if (sample.count > kSegmentsPerBatch || !Finite({sample.elastic_lag_s2, sample.duration_s})) {
+  auto& [header, plan, segment_count, elastic_lag_s2, duration_s, count, segments] = sample;
+  header = FromWire(wire.header());
+  plan = wire.plan();
+  segment_count = wire.segment_count();
+  elastic_lag_s2 = wire.elastic_lag_s2();
+  duration_s = wire.duration_s();
+  count = wire.count();
+  if (count > kSegmentsPerBatch || !Finite({elastic_lag_s2, duration_s})) {
     return false;
   }
   bool sound = true;
-  for (std::size_t i = 0; i < sample.count; ++i) {
-    sound = FromWire(wire.segments()[i], sample.segments[i]) && sound;
+  for (std::size_t i = 0; i < count; ++i) {
+    sound = FromWire(wire.segments()[i], segments[i]) && sound;
   }
   return sound;
 }
 
 void ToWire(const ProcessBatch& sample, idl::trajectory::v1::ProcessBatch& wire) {
-  ToWire(sample.header, wire.header());
-  wire.plan(sample.plan);
-  wire.gate_total(sample.gate_total);
-  wire.event_total(sample.event_total);
-  wire.gate_count(sample.gate_count);
-  for (std::size_t i = 0; i < sample.gate_count; ++i) {
-    idl::trajectory::v1::Gate& gate = wire.gates()[i];
-    gate.id(sample.gates[i].id);
-    gate.kind(Number(sample.gates[i].kind));
-    gate.s_mm(sample.gates[i].s_mm);
-    gate.argument(sample.gates[i].argument);
-    gate.input(Number(sample.gates[i].condition.input()));
-    gate.input_event(Number(sample.gates[i].condition.event()));
+  const auto& [header, plan, gate_total, event_total, gate_count, gates, event_count, events] = sample;
+  Expects(gate_count <= kEventsPerBatch && event_count <= kEventsPerBatch,
+          "a batch of gates and events holds no more than its arrays");
+  ToWire(header, wire.header());
+  wire.plan(plan);
+  wire.gate_total(gate_total);
+  wire.event_total(event_total);
+  wire.gate_count(gate_count);
+  for (std::size_t i = 0; i < gate_count; ++i) {
+    ToWire(gates[i], wire.gates()[i]);
   }
-  wire.event_count(sample.event_count);
-  for (std::size_t i = 0; i < sample.event_count; ++i) {
-    idl::trajectory::v1::ProcessEvent& event = wire.events()[i];
-    event.index(sample.events[i].index);
-    event.action(Number(sample.events[i].action));
-    event.s_mm(sample.events[i].s_mm);
-    event.argument(sample.events[i].argument);
+  wire.event_count(event_count);
+  for (std::size_t i = 0; i < event_count; ++i) {
+    ToWire(events[i], wire.events()[i]);
   }
 }
 
 bool FromWire(const idl::trajectory::v1::ProcessBatch& wire, ProcessBatch& sample) {
-  sample.header = FromWire(wire.header());
-  sample.plan = wire.plan();
-  sample.gate_total = wire.gate_total();
-  sample.event_total = wire.event_total();
-  sample.gate_count = wire.gate_count();
-  sample.event_count = wire.event_count();
-  if (sample.gate_count > kEventsPerBatch || sample.event_count > kEventsPerBatch) {
+  auto& [header, plan, gate_total, event_total, gate_count, gates, event_count, events] = sample;
+  header = FromWire(wire.header());
+  plan = wire.plan();
+  gate_total = wire.gate_total();
+  event_total = wire.event_total();
+  gate_count = wire.gate_count();
+  event_count = wire.event_count();
+  if (gate_count > kEventsPerBatch || event_count > kEventsPerBatch) {
     return false;
   }
   bool sound = true;
-  for (std::size_t i = 0; i < sample.gate_count; ++i) {
-    const idl::trajectory::v1::Gate& gate = wire.gates()[i];
-    Gate& to = sample.gates[i];
-    to.id = gate.id();
-    to.s_mm = gate.s_mm();
-    to.argument = gate.argument();
-    sound = Take(gate.kind(), kGateKinds, to.kind) && TakeCondition(gate, to.kind, to.condition) &&
-            Finite({to.s_mm, to.argument}) && sound;
+  for (std::size_t i = 0; i < gate_count; ++i) {
+    sound = FromWire(wire.gates()[i], gates[i]) && sound;
   }
-  for (std::size_t i = 0; i < sample.event_count; ++i) {
-    const idl::trajectory::v1::ProcessEvent& event = wire.events()[i];
-    ProcessEvent& to = sample.events[i];
-    to.index = event.index();
-    to.s_mm = event.s_mm();
-    to.argument = event.argument();
-    sound = Take(event.action(), kActions, to.action) && Finite({to.s_mm, to.argument}) && sound;
+  for (std::size_t i = 0; i < event_count; ++i) {
+    sound = FromWire(wire.events()[i], events[i]) && sound;
   }
   return sound;
 }

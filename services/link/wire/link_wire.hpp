@@ -1,7 +1,9 @@
 // Translates the samples of the electronic link between the wire and foundation/motion.
 //
-// Model: one FromWire or ToWire a type; both modules' doors use them. FromWire refuses (false) what cannot have come
-// from a sound writer: numbers that are not finite, counts beyond the arrays, enumerators nobody knows.
+// Model: one FromWire or ToWire a type, for every bus door: a sample that two doors translate each by itself is soon two
+// samples. FromWire refuses (false) what cannot have come from a sound writer: numbers that are not finite, counts beyond
+// the arrays, enumerators nobody knows. The parts of a plan are taken apart into all of their members, so that a new member
+// does not compile until it is sent or named as staying behind; source lines stay behind.
 // Threads: pure. Cost: a copy; no allocation.
 #pragma once
 
