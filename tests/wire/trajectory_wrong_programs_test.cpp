@@ -125,7 +125,7 @@ TEST(WrongPrograms, TellTheCauseAndNotWhatFollowsFromIt) {
   EXPECT_EQ(Told("F600\nG41\nG1 X9\nG40 W1\nG92 X0\nG1 X0\nM2\n"), (Causes{"4 AXIS_NOT_DRIVEN"}));
   EXPECT_EQ(Told("F600\nG18 U1\nG2 X2 J1\nG2 X2 K1\nM2\n", kSixAxes),
             (Causes{"2 AXIS_NOT_DRIVEN", "3 ARC_WORD_NOT_OF_PLANE"}));
-  EXPECT_EQ(Told("F600\nG18 G8\nG2 X2 K1\nG2 X4 K1\nG17\nG2 X6 J1\nM2\n"),
+  EXPECT_EQ(Told("F600\nG18 G7\nG2 X2 K1\nG2 X4 K1\nG17\nG2 X6 J1\nM2\n"),
             (Causes{"2 UNKNOWN_G_CODE", "6 ARC_RADIUS_DIFFERS"}));
   EXPECT_EQ(Told("S0 M3\nM3\nM4\nM5\nM2\n", kSixAxes), (Causes{"1 SPINDLE_SPEED_NOT_POSITIVE"}));
   EXPECT_EQ(Told("F600\nG5 X1 Y1 I1 J1 P2\nX2 P1 Q1\nG5 X3 P1 Q1\nM2\n"),

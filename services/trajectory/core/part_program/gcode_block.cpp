@@ -144,16 +144,15 @@ const char* AdviceOnG(int tenfold) {
     case 53:
       return "write NURBS as G5, G1, G2 and G3";
     case 950:
+      return "feed is in units a minute, G94, or inverse time, G93";
     case 960:
-    case 970:
-      return "there is no spindle; feed is in units a minute, G94, or inverse time, G93";
+      return "S is in turns a minute, G97";
     case 382:
     case 383:
     case 384:
     case 385:
       return "there is no touch probe; M100 looks at a mark of the sheet";
     case 70:
-    case 80:
       return "there is no lathe's diameter mode";
     case 730:
     case 740:
@@ -172,7 +171,15 @@ const char* AdviceOnG(int tenfold) {
 
 // ---- which words stand in the line ----
 
+// Radius mode, S in turns a minute, overrides on: what this machine is in always.
+bool StatesTheOnlyMode(char letter, int tenfold) {
+  return letter == 'G' ? tenfold == 80 || tenfold == 970 : tenfold == 480;
+}
+
 bool Sort(Reading& r, Code c, int group, char letter) {
+  if (StatesTheOnlyMode(letter, c.tenfold)) {
+    return true;
+  }
   r.columns[0] = c.column;  // for the faults below; the motion word overwrites it
   if (group == kNoCode) {
     r.FaultAt(kMotion, letter == 'G' ? "UNKNOWN_G_CODE" : "UNKNOWN_M_CODE",
@@ -181,6 +188,10 @@ bool Sort(Reading& r, Code c, int group, char letter) {
     return true;  // for the faults of the words behind
   }
   const auto g = static_cast<std::size_t>(group);
+  if (group == kMotion && (c.tenfold == 800 || r.codes[g] == 800)) {  // G80 beside a motion word yields to it
+    r.codes[g] = r.codes[g] == 800 || r.codes[g] == kNoCode ? c.tenfold : r.codes[g];
+    return true;
+  }
   if (r.codes[g] != kNoCode) {
     return r.FaultAt(kMotion, "MODAL_GROUP_TWICE",
                      "two words of one modal group contradict each other in this line; write them in two");
@@ -199,7 +210,7 @@ bool SortCodes(Reading& r) {
     if (!Sort(r, c, group, 'G')) {
       return false;
     }
-    motion_column = group == kMotion ? c.column : motion_column;
+    motion_column = group == kMotion && r.code(kMotion) == c.tenfold ? c.column : motion_column;
   }
   for (int i = 0; i < r.block.m_count; ++i) {
     const Code c = r.block.m[static_cast<std::size_t>(i)];
@@ -223,7 +234,8 @@ bool NotShared(Reading& r, int takers, char letter, std::string_view reason) {
 // Which words of this line want a P, a Q or an L; more than one would have to share it.
 bool OneTakesEach(Reading& r) {
   const int once = r.code(kOnce), machine = r.code(kMachineWord), output = r.code(kOutput);
-  const int motion = r.code(kMotion) != kNoCode || !r.HasAxisWords() ? r.code(kMotion) : r.state.motion;
+  const bool modal = r.code(kMotion) == kNoCode && r.HasAxisWords() && !r.AxesTaken();
+  const int motion = modal ? r.state.motion : r.code(kMotion);
   const int path = r.code(kPathMode) == 640, call = r.code(kCallWord) == 980;
   const int p = (once == 40) + (once == 100) +
                 (!r.has_spindle() && (r.code(kJet) == 30 || r.code(kJet) == 40)) +
@@ -325,8 +337,9 @@ bool Jet(Reading& r) {
   if (r.has_spindle()) {
     return ObeySpindle(r);
   }
-  r.block.used |=
-      r.options.leave_out_z ? LetterBit('S') : 0u;  // of the spindle that such a program was written for
+  if (r.block.has('S') && !(r.block.Take('S') > 0.0 || r.options.leave_out_z)) {
+    return r.FaultAt('S', "JET_POWER_NOT_POSITIVE", "a jet is on, at any S above 0, or off, by M5");
+  }
   switch (r.code(kJet)) {
     case 30:
     case 40:
@@ -646,9 +659,6 @@ void RefuseUnused(Reading& r, char letter) {
     case 'V':
     case 'W':
       r.FaultAt(letter, "AXIS_NOT_DRIVEN", "this machine has no axes U, V and W");
-      break;
-    case 'S':
-      r.FaultAt(letter, "WORD_NOT_SUPPORTED", "a jet has no spindle speed");
       break;
     case 'H':
       r.FaultAt(letter, "WORD_NOT_SUPPORTED", "H, the row of a tool length, stands with G43");

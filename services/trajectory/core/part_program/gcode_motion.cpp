@@ -41,19 +41,6 @@ bool MachineCoordinatesFit(Reading& r) {
   return r.state.absolute || r.FaultAt(kOnce, "G53_INCREMENTAL", "G53 needs G90");
 }
 
-bool AxesTaken(const Reading& r) {
-  switch (r.code(kOnce)) {
-    case 100:
-    case 280:
-    case 300:
-    case 520:
-    case 920:
-      return true;
-    default:
-      return r.code(kLength) == 431;
-  }
-}
-
 // Whether a motion word of this kind, with no axis word beside it, moves all the same.
 bool MovesWithoutAxes(const Reading& r, int motion) {
   const bool arc = motion == 20 || motion == 30;
@@ -163,7 +150,7 @@ void SetPace(Reading& r, Operation& o, double length_mm, double turned_deg) {
 
 bool ObeyMotion(Reading& r) {
   ModalState& s = r.state;
-  const bool taken = AxesTaken(r);
+  const bool taken = r.AxesTaken();
   const int word = r.code(kMotion);
   if (taken && word != kNoCode && word != 800) {
     return r.FaultAtMotion("AXES_TAKEN_TWICE",

@@ -25,6 +25,19 @@ bool Reading::HasAxisWords() const {
   return (block.present & kAll) != 0;
 }
 
+bool Reading::AxesTaken() const {
+  switch (code(kOnce)) {
+    case 100:
+    case 280:
+    case 300:
+    case 520:
+    case 920:
+      return true;
+    default:
+      return code(kLength) == 431;
+  }
+}
+
 Operation& Reading::Add(OperationKind kind) {
   Operation& o = program.operations.emplace_back();
   o.kind = kind;

@@ -134,6 +134,8 @@ class Reading : public StateParameters {
   double unit(std::size_t axis) const { return axis < kLinearAxes ? state.unit_mm : 1.0; }
   double mm(double written) const { return written * state.unit_mm; }
   bool HasAxisWords() const;
+  // By a word that is obeyed once, or G43.1: then the line's motion mode has none to move with.
+  bool AxesTaken() const;
   // A machine that moves Z has a spindle, another one a jet.
   bool has_spindle() const { return drives(2); }
 

@@ -27,8 +27,11 @@ bool LineScan::Take(std::string_view capitals) {
 
 bool LineScan::Fail(const char* reason, std::size_t from, const char* message) {
   if (!failed()) {
-    fault_ = {reason, static_cast<std::uint32_t>(from + 1),
-              static_cast<std::uint32_t>(at_ > from ? at_ - from : 1), message};
+    std::size_t end = at_ > from ? at_ : from + 1;
+    while (end < line_.size() && (static_cast<unsigned char>(line_[end]) & 0xC0u) == 0x80u) {
+      ++end;  // to the end of a character of several bytes
+    }
+    fault_ = {reason, static_cast<std::uint32_t>(from + 1), static_cast<std::uint32_t>(end - from), message};
   }
   return false;
 }

@@ -49,6 +49,8 @@ class LineParser {
       return Word(c);
     }
     switch (c) {
+      case '$':
+        return Spindle();
       case ';':
         result_.abort_column = 0;  // only the last comment of a line is active
         return false;
@@ -108,13 +110,35 @@ class LineParser {
       return FlowWord(from);
     }
     double value = 0.0;
-    if (!scan_.Number(value, from) && (scan_.failed() || !ReadValue(scan_, parameters_, from, value))) {
+    if (!Value(value, from)) {
       return false;
     }
     if (letter == 'G' || letter == 'M') {
       return AddCode(letter, from, value);
     }
-    return letter == 'N' || AddWord(letter, from, value);
+    return letter == 'N' ? LineNumber(from, value) : AddWord(letter, from, value);
+  }
+
+  bool Value(double& value, std::size_t from) {
+    return scan_.Number(value, from) || (!scan_.failed() && ReadValue(scan_, parameters_, from, value));
+  }
+
+  bool LineNumber(std::size_t from, double value) {
+    if (numbered_ || !block_.empty() || parameters_.pending()) {
+      return scan_.Fail("LINE_NUMBER_NOT_FIRST", from, "N stands once, before the other words of its line");
+    }
+    numbered_ = true;
+    return (value >= 0.0 && value == std::floor(value)) ||
+           scan_.Fail("LINE_NUMBER_NOT_WHOLE", from, "N takes a whole number, 0 or more");
+  }
+
+  // $0, the first spindle, is what M3 and M5 switch without it, too.
+  bool Spindle() {
+    const std::size_t from = scan_.at();
+    scan_.Step();
+    double value = 0.0;
+    return Value(value, from) &&
+           (value == 0.0 || scan_.Fail("SPINDLE_UNKNOWN", from, "this machine has one jet or spindle, $0"));
   }
 
   bool FlowWord(std::size_t from) {
@@ -155,6 +179,7 @@ class LineParser {
   Block& block_;
   Parameters& parameters_;
   LineParse result_;
+  bool numbered_ = false;
 };
 
 }  // namespace
