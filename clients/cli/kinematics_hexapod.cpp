@@ -87,11 +87,14 @@ absl::Status ForEachPose(const PoseTables& files, const std::vector<std::string>
   }
   CsvTable answers(std::move(out_columns));
   std::size_t refused = 0;
+  LongWork solving(output, "solving rows");
   for (const std::array<double, 6>& row : *rows) {
+    solving.At(static_cast<double>(answers.rows().size()) / static_cast<double>(rows->size()));
     std::vector<std::string> cells;
     refused += fill(*hexapod, row, cells) ? 0 : 1;
     answers.AddRow(std::move(cells));
   }
+  solving.Done();
   return DeliverTable(answers, files.out, Counted(rows->size(), refused), output);
 }
 
@@ -319,7 +322,7 @@ absl::Status CutHexapodWorkspace(const HexapodWorkspaceOptions& options, Output&
   if (!hexapod.ok()) {
     return hexapod.status();
   }
-  const auto request = WorkspaceRequestFor(*hexapod, options.step_mm, options.tilt_rad);
+  auto request = WorkspaceRequestFor(*hexapod, options.step_mm, options.tilt_rad);
   if (const absl::Status status = CheckWorkspace(request); !status.ok()) {
     return status;
   }
@@ -330,6 +333,13 @@ absl::Status CutHexapodWorkspace(const HexapodWorkspaceOptions& options, Output&
   CsvTable table(
       {"z_mm", "y_mm", "from_x_mm", "to_x_mm", "from_bound", "from_strut", "to_bound", "to_strut"});
   TextTable areas{{"z_mm", "area_mm2"}, {}};
+  LongWork cutting(output, "cutting slices");
+  const double rows = std::ceil((request.box.y_max_mm - request.box.y_min_mm) / request.step_mm) + 1.0;
+  double row = 0.0;
+  request.cancelled = [&] {
+    cutting.At(row++ / (rows * static_cast<double>(heights.size())));
+    return false;
+  };
   for (const double z : heights) {
     const HexapodSlice slice = CutSlice(*hexapod, request, z);
     areas.rows.push_back({Shortest(z), Fixed(slice.area_mm2, 0)});
@@ -342,6 +352,7 @@ absl::Status CutHexapodWorkspace(const HexapodWorkspaceOptions& options, Output&
                     std::string(BoundName(span.to.bound)), strut(span.to)});
     }
   }
+  cutting.Done();
   if (options.out != "-" && !output.json()) {
     output.Table(areas);
   }

@@ -141,7 +141,9 @@ absl::Status SolveTable(const PlanarTables& files, const MotionColumns& from, co
   }
   CsvTable answers(columns);
   std::size_t refused = 0;
+  LongWork solving(output, "solving rows");
   for (const Motion& motion : motions->rows) {
+    solving.At(static_cast<double>(answers.rows().size()) / static_cast<double>(motions->rows.size()));
     const auto verdict = solve_position(*mechanism, motion.position_mm);
     std::vector<std::string> cells;
     AppendMotion(cells, motion, motions->moves);
@@ -150,6 +152,7 @@ absl::Status SolveTable(const PlanarTables& files, const MotionColumns& from, co
     refused += verdict.reason != Reason::kSolved;
     answers.AddRow(std::move(cells));
   }
+  solving.Done();
   return DeliverTable(answers, files.out, Counted(motions->rows.size(), refused), output);
 }
 
@@ -167,12 +170,15 @@ absl::Status ForEachPose(const PlanarTables& files, std::vector<std::string> col
   }
   CsvTable answers(std::move(columns));
   std::size_t refused = 0;
+  LongWork solving(output, "solving rows");
   for (const Motion& motion : motions->rows) {
+    solving.At(static_cast<double>(answers.rows().size()) / static_cast<double>(motions->rows.size()));
     std::vector<std::string> cells;
     AppendBoth(cells, motion.position_mm);
     refused += fill(*mechanism, motion.position_mm, cells) ? 0 : 1;
     answers.AddRow(std::move(cells));
   }
+  solving.Done();
   return DeliverTable(answers, files.out, Counted(motions->rows.size(), refused), output);
 }
 
@@ -240,7 +246,14 @@ absl::Status Optimise(const OptimiseOptions& options, Output& output) {
   task.lowest_ratio = options.lowest_ratio;
   task.highest_ratio = options.highest_ratio;
   task.evaluations = options.evaluations;
+  LongWork search(output, "trying geometries");
+  int tried = 0;
+  task.cancelled = [&] {
+    search.At(static_cast<double>(tried++) / options.evaluations);
+    return false;
+  };
   const OptimisationAnswer answer = OptimiseGeometry(task);
+  search.Done();  // the search may end before it has used all evaluations
   nlohmann::json json = {
       {"reason", ReasonName(answer.reason)},
       {"objective", options.objective == "gain" ? "error_gain_mm_per_mm" : "rectangle_mm2"},

@@ -15,6 +15,7 @@ namespace lambdajet::cli {
 namespace {
 
 constexpr int kBarWidth = 30;
+constexpr std::chrono::milliseconds kShort{300};  // work that needs no bar
 
 bool WantsColour(std::FILE* stream) {
   const char* no_colour = std::getenv("NO_COLOR");
@@ -196,6 +197,28 @@ void Output::EndProgress() {
     bar_open_ = false;
   }
   last_tenth_ = -1;
+}
+
+LongWork::~LongWork() {
+  if (shown_percent_ >= 0) {
+    output_.EndProgress();
+  }
+}
+
+void LongWork::At(double ratio) {
+  const int percent = static_cast<int>(std::clamp(ratio, 0.0, 1.0) * 100.0);
+  if (percent == shown_percent_ ||
+      (shown_percent_ < 0 && std::chrono::steady_clock::now() - begin_ < kShort)) {
+    return;
+  }
+  shown_percent_ = percent;
+  output_.Progress(ratio, what_);
+}
+
+void LongWork::Done() {
+  if (shown_percent_ >= 0) {
+    At(1.0);
+  }
 }
 
 void Output::Fail(const absl::Status& status) {

@@ -7,11 +7,13 @@
 // on a terminal and without NO_COLOR. Units: as the columns say. Threads: one.
 #pragma once
 
+#include <chrono>
 #include <cstdio>
 #include <initializer_list>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -77,6 +79,25 @@ class Output {
   std::string last_what_;
   OutputOptions options_;
   ExitCode exit_code_ = ExitCode::kOk;
+};
+
+// Shows how far work in many steps has come: nothing of work that is over within 0.3 s, then each new percent. The bar
+// ends where the work did, unless it was Done() before that.
+class LongWork {
+ public:
+  LongWork(Output& output, std::string what) : output_(output), what_(std::move(what)) {}
+  ~LongWork();
+  LongWork(const LongWork&) = delete;
+  LongWork& operator=(const LongWork&) = delete;
+
+  void At(double ratio);
+  void Done();
+
+ private:
+  Output& output_;
+  std::string what_;
+  std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
+  int shown_percent_ = -1;
 };
 
 }  // namespace lambdajet::cli

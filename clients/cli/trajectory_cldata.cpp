@@ -213,7 +213,10 @@ absl::Status Pilger(const CldataVerb& verb, Output& output) {
   if (!file.ok()) {
     return file.status();
   }
-  const trajectory::PilgerProgram program = PlanPilgerDie(file->die);
+  const trajectory::PilgerProgram program = [&] {
+    LongWork planning(output, "planning passes");
+    return PlanPilgerDie(file->die, [&planning](double ratio) { planning.At(ratio); });
+  }();
   if (program.refusal != trajectory::PilgerRefusal::kNone) {
     TellFaults(verb.file, {{0, 0, PilgerRefusalName(program.refusal), file->name, program.message}}, output);
     return absl::OkStatus();

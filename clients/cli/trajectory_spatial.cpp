@@ -432,10 +432,12 @@ absl::Status PlaySpatial(const SpatialVerb& verb, Output& output) {
   const trajectory::PartProgram program = trajectory::ReadSpatialProgram(files->text, machine.motion);
   trajectory::SpatialPlayOptions options;
   options.cycle_s = 1.0 / verb.rate_hz;
-  output.Message(
-      fmt::format("playing {:.0f} s of the plan at {:.0f} Hz", (*answer)->plan.duration_s, verb.rate_hz));
+  LongWork playing(output, fmt::format("playing {:.0f} s of the plan at {:.0f} Hz",
+                                       (*answer)->plan.duration_s, verb.rate_hz));
+  options.watch = [&playing](double ratio) { playing.At(ratio); };
   const trajectory::SpatialPlayReport played =
       PlaySpatialPlan(**answer, program.operations, machine, options);
+  playing.Done();
   TellPlay(played, machine.motion, verb.rate_hz, output);
   if (verb.picture.empty()) {
     return absl::OkStatus();

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <random>
@@ -92,8 +93,13 @@ Vector3d Surface(const Groove& g, double phi, double alpha) {
 // From the written program: the groove's point nearest to each wheel is at the rounding's distance, and is where it should be.
 TEST(PilgerProgram, EveryContactLiesOnTheGrooveAndNormalToIt) {
   const PilgerDie d = Die();
-  const PilgerProgram program = PlanPilgerDie(d);
+  std::vector<double> told;
+  const PilgerProgram program = PlanPilgerDie(d, [&told](double ratio) { told.push_back(ratio); });
   ASSERT_EQ(program.refusal, PilgerRefusal::kNone) << program.message;
+  ASSERT_EQ(told.size(), program.passes.size());
+  EXPECT_TRUE(std::is_sorted(told.begin(), told.end()));
+  EXPECT_EQ(told.front(), 0.0);
+  EXPECT_EQ(told.back(), 1.0);
   const CldataText text = WriteCldata(OperationsOf(program, d), "die");
   const PartProgram read = ReadCldata(text.text, {.axes = kSixAxes});
   ASSERT_TRUE(read.faults.empty());

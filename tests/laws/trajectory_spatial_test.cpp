@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -841,7 +842,13 @@ TEST(SpatialPlay, SeesAPathThatIsNotTheProgrammedOne) {
   const PlannedSpatialProgram planned = PlanOf(line(0.0));
   SpatialPlayOptions options;
   options.cycle_s = 1e-3;
+  std::vector<double> told;
+  options.watch = [&told](double ratio) { told.push_back(ratio); };
   EXPECT_LE(PlaySpatialPlan(planned, line(0.0), WorkedModel(), options).tip_error_mm.value, 1e-6);
+  EXPECT_GE(told.size(), 20u);
+  EXPECT_TRUE(std::is_sorted(told.begin(), told.end()));
+  EXPECT_GT(told.back(), 0.9);
+  EXPECT_LE(told.back(), 1.0);
   const SpatialPlayReport off = PlaySpatialPlan(planned, line(0.5), WorkedModel(), options);
   EXPECT_NEAR(off.tip_error_mm.value, 0.5, 0.01);
   EXPECT_NEAR(off.missed_end_mm.value, 0.5, 0.01);

@@ -1,9 +1,14 @@
 // The lambda's half of `lambdajet kinematics` as a person runs it: tables in, tables and pictures out, exit codes.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <pty.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <fstream>
+#include <regex>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -63,6 +68,50 @@ class PlanarCli : public testing::Test {
   test::TemporaryFolder folder_;
   std::string out_, err_;
 };
+
+// All that a person sees of the command on a terminal of their own.
+std::string OnTerminal(const std::vector<std::string>& words) {
+  const std::string program = test::BinDir() + "/lambdajet";
+  std::vector<char*> arguments = {const_cast<char*>(program.c_str())};
+  for (const std::string& word : words) {
+    arguments.push_back(const_cast<char*>(word.c_str()));
+  }
+  arguments.push_back(nullptr);
+  int terminal = -1;
+  const pid_t child = forkpty(&terminal, nullptr, nullptr, nullptr);
+  if (child == 0) {
+    execv(program.c_str(), arguments.data());
+    _exit(127);
+  }
+  std::string seen;
+  char bytes[4096];
+  for (ssize_t count = 0; (count = read(terminal, bytes, sizeof bytes)) > 0;) {
+    seen.append(bytes, static_cast<std::size_t>(count));
+  }
+  close(terminal);
+  int status = 0;
+  EXPECT_EQ(waitpid(child, &status, 0), child);
+  EXPECT_EQ(WIFEXITED(status) ? WEXITSTATUS(status) : -1, 0) << seen;
+  return seen;
+}
+
+// The percents of a bar and of what it says is done, in their order.
+std::vector<int> Percents(const std::string& seen, const std::string& what) {
+  std::vector<int> percents;
+  const std::regex bar(R"(\[#*\.*\] +(\d+) % )" + what);
+  for (std::sregex_iterator found(seen.begin(), seen.end(), bar), none; found != none; ++found) {
+    percents.push_back(std::stoi((*found)[1]));
+  }
+  return percents;
+}
+
+// It grows, in steps that can be seen; what stands there last is where the work ended.
+void ExpectGrowingBar(const std::string& seen, const std::string& what) {
+  const std::vector<int> percents = Percents(seen, what);
+  ASSERT_GE(percents.size(), 5u) << seen;
+  EXPECT_TRUE(std::ranges::is_sorted(percents)) << seen;
+  EXPECT_EQ(percents.back(), 100) << seen;
+}
 
 TEST_F(PlanarCli, InverseAndForwardUndoEachOtherRowByRow) {
   const std::string poses = Write("poses.csv", "x_D_mm,y_D_mm\n500,700\n0,1234\n-100,400\n0,3\n");
@@ -124,6 +173,24 @@ TEST_F(PlanarCli, OptimisesAndWritesAMachineFileThatReads) {
                  "--evaluations", "50"}),
             4);
   EXPECT_THAT(err_, HasSubstr("OUT_OF_REACH"));
+}
+
+TEST_F(PlanarCli, ShowsABarOnATerminalWhileWorkIsLong) {
+  const std::vector<std::string> optimise = {"optimise",    "--machine", Machine(),       "--zone-mm",
+                                             "0",           "300",       "800",           "900",
+                                             "--objective", "rectangle", "--evaluations", "250"};
+  std::vector<std::string> words = optimise;
+  words.insert(words.begin(), "kinematics");
+  ExpectGrowingBar(OnTerminal(words), "trying geometries");
+  words.insert(words.begin(), "--quiet");
+  EXPECT_TRUE(Percents(OnTerminal(words), "trying geometries").empty());
+  ASSERT_EQ(Run(optimise), 0) << err_;
+  EXPECT_THAT(out_, testing::Not(HasSubstr("trying geometries")));
+  EXPECT_THAT(err_, testing::Not(HasSubstr("\x1b["))) << "a bar is for terminals";
+  EXPECT_THAT(err_, HasSubstr("% trying geometries"));
+
+  const std::string die = test::SourceDir() + "/deploy/parts/pilger_die/die.yaml";
+  ExpectGrowingBar(OnTerminal({"trajectory", "pilger", die}), "planning passes");
 }
 
 TEST_F(PlanarCli, DrawsPicturesInBothFormats) {

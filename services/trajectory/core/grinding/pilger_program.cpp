@@ -263,13 +263,16 @@ std::string_view PilgerRefusalName(PilgerRefusal refusal) {
   return kNames[static_cast<std::size_t>(refusal)];
 }
 
-PilgerProgram PlanPilgerDie(const PilgerDie& d) {
+PilgerProgram PlanPilgerDie(const PilgerDie& d, const std::function<void(double)>& watch) {
   PilgerProgram program = CheckNumbers(d);
   if (program.refusal != PilgerRefusal::kNone) {
     return program;
   }
   program.largest_profile_radius_mm = program.least_clearance_mm = 1e9;
   for (double alpha = d.alpha_from_rad;;) {
+    if (watch) {
+      watch((alpha - d.alpha_from_rad) / (d.alpha_to_rad - d.alpha_from_rad));
+    }
     PilgerProgram fault = CheckCurvature(d, alpha, program.largest_profile_radius_mm);
     if (fault.refusal == PilgerRefusal::kNone) {
       fault = CheckBody(d, alpha, program.least_clearance_mm);

@@ -12,6 +12,7 @@
 #pragma once
 
 #include <array>
+#include <functional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -85,7 +86,8 @@ struct PilgerProgram {
       0.0;  // of the wheel's body from the rest of the groove, over all looked-at poses
 };
 
-PilgerProgram PlanPilgerDie(const PilgerDie& die);
+// `watch` is told before each pass how much of the way from the first to the last is behind it, 0 to 1.
+PilgerProgram PlanPilgerDie(const PilgerDie& die, const std::function<void(double ratio)>& watch = {});
 
 // The program's operations: approach, passes and idle zones at an even turn of the die, retreat. Rounded to 1e-10 mm.
 std::vector<Operation> OperationsOf(const PilgerProgram& program, const PilgerDie& die);

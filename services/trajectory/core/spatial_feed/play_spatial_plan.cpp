@@ -101,6 +101,9 @@ class Player {
       since_.tau_s = tau_s;
       report_.trace.push_back(since_);
       since_ = {tau_s};
+      if (options_.watch) {
+        options_.watch(tau_s / plan_.duration_s);
+      }
     }
   }
 

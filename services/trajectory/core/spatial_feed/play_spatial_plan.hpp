@@ -11,6 +11,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "trajectory/core/spatial_feed/spatial_program.hpp"
@@ -22,7 +23,8 @@ struct SpatialPlayOptions {
   double trace_s = 0.02;  // distance of the trace's points
   double drive_gain_per_s = 100.0;
   double drive_lag_s = 0.001;
-  double settled_mm = 0.001;  // largest difference of any strut at which a gate begins
+  double settled_mm = 0.001;                     // largest difference of any strut at which a gate begins
+  std::function<void(double ratio)> watch = {};  // told at the trace's points how much of the plan was played
 };
 
 // The worst of something, and where.
