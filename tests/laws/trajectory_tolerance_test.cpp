@@ -4,10 +4,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <string>
 #include <tuple>
 #include <vector>
 
 #include "tests/laws/trajectory_cases.hpp"
+#include "tests/laws/trajectory_hostile_programs.hpp"
+#include "tests/laws/trajectory_plan_judges.hpp"
 #include "trajectory/core/tolerance/judged_contour.hpp"
 #include "trajectory/core/tolerance/plan_to_tolerance.hpp"
 
@@ -46,6 +51,7 @@ JudgedContour JudgeAgain(const std::string& program, const MachineDescription& m
                          const Pace& pace, PlannedProgram& planned) {
   std::vector<ProgramFault> faults;
   options.tolerance_mm = 10.0;
+  options.sample_s = kJudgedEvery_s;
   options.pace = std::make_shared<const Pace>(pace);
   const ProgramPath path = LayOutProgram(program, machine, options, faults);
   planned = PlanLaidOutProgram(path, machine, options);
@@ -223,6 +229,126 @@ TEST(FeedFromTolerance, ProgressGrowsEvenlyAndEndsAtOne) {
       EXPECT_LE(off, 0.5);
     }
   }
+}
+
+PlannedProgram SampledAgain(const std::string& program, const MachineDescription& machine,
+                            PlanOptions options, const Pace& pace) {
+  std::vector<ProgramFault> faults;
+  options.sample_s = 0.001;
+  options.tolerance_mm = 10.0;
+  options.pace = std::make_shared<const Pace>(pace);
+  const ProgramPath path = LayOutProgram(program, machine, options, faults);
+  return PlanLaidOutProgram(path, machine, options);
+}
+
+// How far the plan is from the programmed cuts, in mm, by the judges' own search; a cut that does not move is no feature, so all
+// of them are looked at.
+class ProgrammedContour {
+ public:
+  ProgrammedContour(const MachineDescription& machine, const std::string& program, const Plan& plan) {
+    const ProgrammedCuts programmed(machine, program, plan);
+    for (const Polyline& cut : programmed.cuts()) {
+      cuts_.emplace_back();
+      for (const Polyline::Point& point : cut.points()) {
+        cuts_.back().Add(point.p, point.s, 1.0);
+      }
+    }
+  }
+  double Distance_mm(const Eigen::Vector2d& p, double s_mm) const {
+    double nearest = INFINITY;
+    for (const Polyline& cut : cuts_) {
+      nearest = std::min(nearest, cut.Share(p, s_mm));
+    }
+    return nearest;
+  }
+
+ private:
+  std::vector<Polyline> cuts_;
+};
+
+// The largest 95 % bound, in shares of the tolerance, at every millisecond of the answer: a look that has neither the search's
+// places nor its samples.
+double WorstShareSeenClosely(const std::string& program, const MachineDescription& machine,
+                             const PlanOptions& options, const TolerancePlan& answer) {
+  const PlannedProgram planned = SampledAgain(program, machine, options, answer.report.pace);
+  EXPECT_EQ(planned.plan.duration_s, answer.planned.plan.duration_s);
+  accuracy::ContourModel model(machine);
+  std::uint32_t line = 0;
+  EXPECT_EQ(accuracy::BuildContourModel(SamplesWithGates(machine, planned), options.compensate, 1, model,
+                                        line, 5e-4),
+            accuracy::PredictionReason::kPredicted);
+  const accuracy::PointErrors errors = accuracy::PropagateLinearly(model);
+  const ProgrammedContour contour(machine, program, planned.plan);
+  double worst_mm = 0.0;
+  for (std::size_t k = 0; k < model.points.size(); ++k) {
+    double bias = 0.0, variance = 0.0;
+    for (std::size_t s = 0; s < accuracy::kSourceCount; ++s) {
+      bias += errors.bias_mm[k][s];
+      variance += errors.variance_mm2[k][s];
+    }
+    const accuracy::ContourModel::Point& point = model.points[k];
+    const double bound = accuracy::FoldedNormalQuantile(bias, std::sqrt(std::max(0.0, variance)), 0.95);
+    worst_mm =
+        std::max(worst_mm, bound + contour.Distance_mm(point.p_W_mm, planned.samples[point.sample].s_mm));
+  }
+  EXPECT_GT(worst_mm, 0.0);
+  return worst_mm / options.hold[0].tolerance_mm;
+}
+
+void ExpectBlame(const TolerancePlan& refused, double tolerance_mm) {
+  EXPECT_EQ(refused.planned.faults[0].reason, "TOLERANCE_NOT_REACHED");
+  ASSERT_EQ(refused.report.blame.size(), 1u);
+  EXPECT_GT(refused.report.blame[0].predicted_mm, tolerance_mm);
+  EXPECT_GT(refused.report.blame[0].line, 0u);
+  EXPECT_EQ(refused.planned.faults[0].line, refused.report.blame[0].line);
+}
+
+// LAMBDAJET_EACH_PROGRAM tells each.
+void TellEach(int seed, const char* kind, double tolerance_mm, const TolerancePlan& answer, double seen) {
+  if (std::getenv("LAMBDAJET_EACH_PROGRAM") != nullptr) {
+    std::printf("each %d %s %g mm: %.4f s of %.4f s, %d plans, seen %.4f %s\n", seed, kind, tolerance_mm,
+                answer.planned.plan.duration_s, answer.report.fastest_s, answer.report.plans, seen,
+                FirstFault(answer).c_str());
+  }
+}
+
+// Of the tolerance, between the places that the search looks at.
+constexpr double kBetweenPlaces = 1.01;
+
+TEST(FeedFromTolerance, HoldsEverywhereOnHostilePrograms) {
+  const MachineDescription machine = IdentifiedMachine();
+  Worst worst;
+  double most_seen = 0.0;
+  std::size_t held = 0, refused = 0;
+  const Seeds seeds = WantedSeeds({14, 16});
+  for (int seed = seeds.first; seed <= seeds.last; ++seed) {
+    HostileProgram hostile(static_cast<unsigned>(seed));
+    const std::string program = hostile.Make();
+    double tighter_s = INFINITY;
+    for (const double tolerance : {0.01, 0.06, 0.12}) {
+      SCOPED_TRACE(std::to_string(seed) + " " + hostile.kind_name() + " at " + std::to_string(tolerance));
+      const PlanOptions options = Holding(tolerance, seed % 2 == 1);
+      const TolerancePlan answer = PlanToTolerance(program, machine, options);
+      const bool planned = answer.planned.faults.empty();
+      const double seen = planned ? WorstShareSeenClosely(program, machine, options, answer) : 0.0;
+      TellEach(seed, hostile.kind_name(), tolerance, answer, seen);
+      ++(planned ? held : refused);
+      if (!planned) {
+        EXPECT_TRUE(std::isinf(tighter_s)) << "a tighter one is held: " << FirstFault(answer);
+        ExpectBlame(answer, tolerance);
+        continue;
+      }
+      EXPECT_LE(seen, kBetweenPlaces);
+      most_seen = std::max(most_seen, seen);
+      ExpectPlanLaws(machine, program, answer.planned, worst);
+      EXPECT_LE(answer.planned.plan.duration_s, 1.02 * tighter_s);
+      tighter_s = answer.planned.plan.duration_s;
+    }
+  }
+  EXPECT_GT(held, 0u);
+  EXPECT_GT(refused, 0u);
+  tests::PrintFigure("to_tolerance.seen_closely", most_seen);
+  Tell("to_tolerance", held, false, worst);
 }
 
 TEST(FeedFromTolerance, RefusesWishesThatMeanNothing) {

@@ -119,6 +119,8 @@ double LagBias(std::span<const PlanSample> samples, const std::vector<Eigen::Vec
 
 struct Walk {
   double spacing_mm;
+  double longest_s;
+  double kept_s = 0.0;
   double walked_mm = 0.0;
   double kept_mm = 0.0;
   std::size_t end_of_cut = 0;
@@ -142,15 +144,17 @@ bool AddPoint(std::span<const PlanSample> samples, const std::vector<Eigen::Vect
   point.sample = i;
   point.feature = model.features - 1;
   walk.kept_mm = walk.walked_mm;
+  walk.kept_s = samples[i].tau_s;
   model.points.push_back(point);
   return true;
 }
 
-// Points at equal distances of cut length. False with the line where the mechanism cannot stand.
-bool FillPoints(std::span<const PlanSample> samples, double spacing_mm, ContourModel& model,
+// Points at equal distances of cut length, and not longer apart than asked. False with the line where the mechanism cannot
+// stand.
+bool FillPoints(std::span<const PlanSample> samples, double spacing_mm, double longest_s, ContourModel& model,
                 std::uint32_t& blame_line) {
   const auto front = PlayFront(samples, model.chain.jet_lag_time_s);
-  Walk walk{spacing_mm};
+  Walk walk{spacing_mm, longest_s};
   for (std::size_t i = 1; i < samples.size(); ++i) {
     if (!Cuts(samples, i)) {
       continue;
@@ -161,8 +165,9 @@ bool FillPoints(std::span<const PlanSample> samples, double spacing_mm, ContourM
     }
     const double step = StepLength(samples, i);
     walk.walked_mm += step;
-    if (step > kShortestStepMm && walk.walked_mm - walk.kept_mm >= walk.spacing_mm &&
-        !AddPoint(samples, front, i, walk, model)) {
+    const bool due =
+        walk.walked_mm - walk.kept_mm >= walk.spacing_mm || samples[i].tau_s - walk.kept_s >= walk.longest_s;
+    if (step > kShortestStepMm && due && !AddPoint(samples, front, i, walk, model)) {
       blame_line = samples[i].source_line;
       return false;
     }
@@ -184,7 +189,7 @@ ParameterCovariance SquareRoot(const ParameterCovariance& covariance) {
 }  // namespace
 
 PredictionReason BuildContourModel(std::span<const PlanSample> samples, bool compensated, int points,
-                                   ContourModel& model, std::uint32_t& blame_line) {
+                                   ContourModel& model, std::uint32_t& blame_line, double longest_s) {
   const PredictionReason reason = Judge(samples, blame_line);
   if (reason != PredictionReason::kPredicted) {
     return reason;
@@ -197,8 +202,8 @@ PredictionReason BuildContourModel(std::span<const PlanSample> samples, bool com
   model.spread = SquareRoot(model.chain.covariance);
   FillSteps(samples, model);
   const double spacing = 0.999999 * length / std::max(1, points);
-  return FillPoints(samples, spacing, model, blame_line) ? PredictionReason::kPredicted
-                                                         : PredictionReason::kUnreachable;
+  return FillPoints(samples, spacing, longest_s, model, blame_line) ? PredictionReason::kPredicted
+                                                                    : PredictionReason::kUnreachable;
 }
 
 void PlaySpring(const ContourModel& model, double elastic_lag_s2, double damping_time_s,

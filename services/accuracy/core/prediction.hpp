@@ -21,6 +21,7 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <span>
 #include <string_view>
 #include <vector>
@@ -139,9 +140,11 @@ struct DrawSpace {
 // `space`. Cost: no allocation.
 double DrawContour(const ContourModel& model, std::uint64_t seed, std::uint64_t draw, DrawSpace& space);
 
-// Walks the plan. Leaves a model fit for DrawContour where the answer is kPredicted.
+// Walks the plan. Leaves a model fit for DrawContour where the answer is kPredicted. Where the jet creeps, a spring swings through
+// its whole deviation on a hundredth of a millimetre: `longest_s` asks for more points, so that none are longer apart than that.
 PredictionReason BuildContourModel(std::span<const PlanSample> samples, bool compensated, int points,
-                                   ContourModel& model, std::uint32_t& blame_line);
+                                   ContourModel& model, std::uint32_t& blame_line,
+                                   double longest_s = std::numeric_limits<double>::infinity());
 
 // The spring's part of the deviation at each point, for a machine of the given elastic lag and damping time.
 void PlaySpring(const ContourModel& model, double elastic_lag_s2, double damping_time_s,

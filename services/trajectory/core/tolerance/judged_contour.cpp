@@ -14,6 +14,7 @@ using Eigen::Vector2d;
 constexpr double kPlaceSpacing_mm = 0.25;
 constexpr double kFewestPlaces = 600.0;
 constexpr double kMostPlaces = 40000.0;
+constexpr double kMostMore = 100000.0;  // of those for where the jet creeps
 constexpr double kDrawnSpacing_mm = 1.0;
 constexpr double kMostDrawnPlaces = 4000.0;
 constexpr int kDraws = 300;
@@ -257,7 +258,9 @@ JudgedContour JudgeContour(const MachineDescription& machine, const ProgramPath&
   const auto points =
       static_cast<int>(std::clamp(CutLength(planned) / kPlaceSpacing_mm, kFewestPlaces, kMostPlaces));
   const std::vector<PlanSample> samples = SamplesWithGates(machine, planned);
-  judged.reason = accuracy::BuildContourModel(samples, planned.plan.compensated, points, model, blame_line);
+  const double longest_s = std::max(1.99 * kJudgedEvery_s, planned.plan.duration_s / kMostMore);
+  judged.reason =
+      accuracy::BuildContourModel(samples, planned.plan.compensated, points, model, blame_line, longest_s);
   if (judged.reason != accuracy::PredictionReason::kPredicted) {
     return judged;
   }

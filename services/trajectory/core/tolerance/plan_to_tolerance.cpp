@@ -123,6 +123,7 @@ class Tolerances {
   static PlanOptions InnerOptions(PlanOptions options) {
     options.tolerance_mm = kUnlimited_mm;
     options.start_from_s_mm.reset();
+    options.sample_s = kJudgedEvery_s;
     return options;
   }
 
@@ -255,7 +256,7 @@ TolerancePlan PlanToTolerance(std::string_view program, const MachineDescription
   }
   PassProgress passes(progress);
   answer = Tolerances(path, machine, options, passes).Solve();
-  if (answer.planned.faults.empty() && options.start_from_s_mm) {
+  if (answer.planned.faults.empty() && (options.start_from_s_mm || options.sample_s != kJudgedEvery_s)) {
     fast.pace = std::make_shared<const Pace>(answer.report.pace);
     passes.Begin(1.0);
     answer.planned =
