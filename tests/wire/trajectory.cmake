@@ -1,2 +1,2 @@
 lambdajet_check(wire_trajectory LABELS wire SOURCES trajectory_wrong_programs_test.cpp
-  trajectory_right_programs_test.cpp trajectory_plan_wire_test.cpp DEPS trajectory_core link_wire)
+  trajectory_right_programs_test.cpp trajectory_linuxcnc_test.cpp trajectory_plan_wire_test.cpp DEPS trajectory_core link_wire)

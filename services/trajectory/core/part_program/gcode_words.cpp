@@ -128,8 +128,7 @@ class LineParser {
       return scan_.Fail("LINE_NUMBER_NOT_FIRST", from, "N stands once, before the other words of its line");
     }
     numbered_ = true;
-    return (value >= 0.0 && value == std::floor(value)) ||
-           scan_.Fail("LINE_NUMBER_NOT_WHOLE", from, "N takes a whole number, 0 or more");
+    return value >= 0.0 || scan_.Fail("LINE_NUMBER_NEGATIVE", from, "N takes a number from 0");
   }
 
   // $0, the first spindle, is what M3 and M5 switch without it, too.
