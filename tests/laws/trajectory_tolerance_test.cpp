@@ -351,6 +351,25 @@ TEST(FeedFromTolerance, HoldsEverywhereOnHostilePrograms) {
   Tell("to_tolerance", held, false, worst);
 }
 
+// What is cut lies on the contour to the last, and yet the tip is missing.
+TEST(FeedFromTolerance, CutsTheTipOfASpikeThoughThePathMayMissIt) {
+  const MachineDescription machine = IdentifiedMachine();
+  const char* kSpike =
+      "G21 G90 F6000\nG64 P%s\nG0 X300 Y200\nM3\nG1 X330\nG1 X300.5 Y200.2\nG1 X310 Y215\nM5\nM2\n";
+  const auto with = [&](const char* p) {
+    char text[200];
+    std::snprintf(text, sizeof text, kSpike, p);
+    return std::string(text);
+  };
+  for (const auto& [p, tolerance] : {std::pair{"0.05", 0.05}, {"0.1", 0.1}}) {
+    SCOPED_TRACE(p);
+    const TolerancePlan answer = PlanToTolerance(with("0.2"), machine, Holding(tolerance, true));
+    ASSERT_TRUE(answer.planned.faults.empty()) << FirstFault(answer);
+    Worst worst;
+    ExpectContour(machine, with(p), answer.planned, worst);
+  }
+}
+
 TEST(FeedFromTolerance, RefusesWishesThatMeanNothing) {
   const MachineDescription machine = IdentifiedMachine();
   for (const ToleranceWish& wish : {ToleranceWish{0.0}, {-1.0}, {std::nan("")}, {11.0}, {0.1, 5, 3, 0}}) {

@@ -79,14 +79,6 @@ bool Covers(const ToleranceWish& wish, std::uint32_t contour, std::uint32_t line
          (any_line || (line >= wish.first_line && line <= wish.last_line));
 }
 
-double ToleranceOf(const std::vector<ToleranceWish>& wishes, std::uint32_t contour, std::uint32_t line) {
-  double tolerance = std::numeric_limits<double>::infinity();
-  for (const ToleranceWish& wish : wishes) {
-    tolerance = Covers(wish, contour, line) ? std::min(tolerance, wish.tolerance_mm) : tolerance;
-  }
-  return tolerance;
-}
-
 // Groups in the order in which the cut meets them.
 class Grouping {
  public:
@@ -209,6 +201,14 @@ std::vector<std::size_t> GroupOfSample(const JudgedContour& judged, std::size_t 
 }
 
 }  // namespace
+
+double ToleranceOf(const std::vector<ToleranceWish>& wishes, std::uint32_t contour, std::uint32_t line) {
+  double tolerance = std::numeric_limits<double>::infinity();
+  for (const ToleranceWish& wish : wishes) {
+    tolerance = Covers(wish, contour, line) ? std::min(tolerance, wish.tolerance_mm) : tolerance;
+  }
+  return tolerance;
+}
 
 double BoundAt(const JudgedPlace& place, double widening, double pace) {
   const double square = pace * pace;

@@ -53,6 +53,9 @@ struct JudgedPlace {
   accuracy::Source worst_still_source = accuracy::Source::kBase;  // of what the feed does not change
 };
 
+// The tightest that is asked of a line in the n-th cut, 1 the first; infinite where none is.
+double ToleranceOf(const std::vector<ToleranceWish>& wishes, std::uint32_t contour, std::uint32_t line);
+
 struct JudgedGroup {
   std::uint32_t contour = 0;  // 1 is the first
   std::uint32_t first_line = 0;

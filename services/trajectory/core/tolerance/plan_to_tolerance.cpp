@@ -234,6 +234,36 @@ void End(const PlanProgress& progress, const PlannedProgram& planned) {
   }
 }
 
+// The path's own tolerance is what a corner may be missed by, and no bound of a place knows of it: where less is asked of the
+// cut, less is left to the path.
+void TightenPath(const std::vector<ToleranceWish>& wishes, ProgramPath& path) {
+  std::uint32_t contour = 0;
+  bool jet_on = false;
+  const auto switch_jet = [&](bool on) {
+    contour += on && !jet_on ? 1 : 0;
+    jet_on = on;
+  };
+  for (PathElement& element : path.elements) {
+    switch_jet(element.jet_on);
+    std::size_t next = 0;
+    const auto pass_events = [&](double offset_mm) {
+      for (; next < element.events.size() && element.events[next].offset_mm <= offset_mm; ++next) {
+        const ProcessAction action = element.events[next].action;
+        if (action == ProcessAction::kJetOn || action == ProcessAction::kJetOff) {
+          switch_jet(action == ProcessAction::kJetOn);
+        }
+      }
+    };
+    for (PathPiece& piece : element.pieces) {
+      pass_events(piece.begin_mm);
+      if (jet_on) {
+        piece.tolerance_mm = std::min(piece.tolerance_mm, ToleranceOf(wishes, contour, piece.line));
+      }
+    }
+    pass_events(element.length_mm());
+  }
+}
+
 }  // namespace
 
 TolerancePlan PlanToTolerance(std::string_view program, const MachineDescription& machine,
@@ -250,10 +280,11 @@ TolerancePlan PlanToTolerance(std::string_view program, const MachineDescription
   }
   PlanOptions fast = options;
   fast.tolerance_mm = kUnlimited_mm;
-  const ProgramPath path = LayOutProgram(program, machine, fast, answer.planned.faults);
+  ProgramPath path = LayOutProgram(program, machine, fast, answer.planned.faults);
   if (!answer.planned.faults.empty()) {
     return answer;
   }
+  TightenPath(options.hold, path);
   PassProgress passes(progress);
   answer = Tolerances(path, machine, options, passes).Solve();
   if (answer.planned.faults.empty() && (options.start_from_s_mm || options.sample_s != kJudgedEvery_s)) {

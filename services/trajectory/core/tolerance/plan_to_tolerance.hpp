@@ -5,6 +5,7 @@
 // percentile does not stay inside with 95 % probability its bounds are widened and the search goes on. The answer holds both.
 // Refused with TOLERANCE_NOT_REACHED where what the feed cannot change is too much already, or no pace was found: with line,
 // place, excess, the source to blame and what would help.
+// A corner is missed by no more than its tolerance either, though the program's G64 P allows more.
 // With a resume, the pace is found for the whole program and the rest planned with it.
 // Progress never falls, moves with every plan that is tried (pass_progress.hpp), and is 1 when there is a plan.
 // Frames: W. Units: mm, s. Threads: pure; same inputs, same plan. Cost: some 20 to 60 plans. Errors: faults, no plan then.
