@@ -7,8 +7,10 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <numbers>
 #include <random>
 #include <string>
+#include <vector>
 
 #include "tests/laws/trajectory_cases.hpp"
 #include "tests/laws/trajectory_hostile_programs.hpp"
@@ -115,6 +117,26 @@ TEST(ShortBlockLaw, AFastBlockBetweenSlowEndsIsNotCrept) {
       ASSERT_TRUE(planned.faults.empty()) << planned.faults[0].reason;
       EXPECT_LE(planned.cutting_time_s, StoppingEverywhere_s(m, text));
     }
+  }
+}
+
+// A shop writes G64 P0.1 or P0.5 to go faster. Corners may cost a little more where a wider crossing was chosen and did not pay.
+TEST(CornerLaw, AWiderPathToleranceIsHardlyEverSlower) {
+  const MachineDescription m = DemoLikeMachine();
+  std::vector<double> total_s;
+  for (const char* p : {"0.02", "0.05", "0.1", "0.2", "0.5", "2"}) {
+    total_s.push_back(0.0);
+    for (const double degrees : {5.0, 20.0, 45.0, 90.0, 120.0, 135.0, 150.0, 168.0, 180.0}) {
+      char text[200];
+      std::snprintf(text, sizeof text,
+                    "G21 G90 F6000\nG64 P%s\nG0 X300 Y200\nM3\nG1 X330\nG1 X%.6f Y%.6f\nM5\nM2\n", p,
+                    330.0 + 20.0 * std::cos(degrees * std::numbers::pi / 180.0),
+                    200.0 + 20.0 * std::sin(degrees * std::numbers::pi / 180.0));
+      const PlannedProgram planned = PlanPartProgram(text, m, {});
+      ASSERT_TRUE(planned.faults.empty()) << planned.faults[0].reason;
+      total_s.back() += planned.cutting_time_s;
+    }
+    EXPECT_LE(total_s.back(), 1.025 * *std::min_element(total_s.begin(), total_s.end())) << "P" << p;
   }
 }
 

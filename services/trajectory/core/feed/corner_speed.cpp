@@ -37,6 +37,10 @@ CornerRule::CornerRule(const SmoothingFilter& filter, double kink_deviation_s, d
       jerk_(jerk_mm_per_s3) {
   const std::vector<double> kernel = KernelOf(filter);
   const int reach = static_cast<int>(kernel.size()) / 2;
+  for (std::size_t i = 1; i < kernel.size(); ++i) {
+    kernel_slope_per_s2_ =
+        std::max(kernel_slope_per_s2_, std::abs(kernel[i] - kernel[i - 1]) / (filter.knot_s * filter.knot_s));
+  }
   for (std::size_t h = 0; h < kHolds; ++h) {
     hold_s_[h] = 2.0 * reach_s_ * static_cast<double>(h) / static_cast<double>(kHolds - 1);
     for (int i = -reach; i <= reach; ++i) {
@@ -62,6 +66,8 @@ CornerRule::Crossing CornerRule::Cross(double angle_rad, double deviation_mm, do
       const double turning = 2.0 * acceleration_ * std::cos(0.5 * angle_rad) / first_s_;
       const double room = kShareOfJerk * kShareOfJerk * jerk_ * jerk_ - turning * turning;
       by_limits = std::min(by_limits, std::sqrt(std::max(0.0, room)) * first_s_ * second_s_ / change);
+    } else {
+      by_limits = std::min(by_limits, kShareOfJerk * jerk_ / (kernel_slope_per_s2_ * change));
     }
     const double v = std::min({by_tolerance, by_limits, feed_mm_per_s});
     if (v < kLeastSpeed_mm_per_s) {

@@ -5,8 +5,8 @@
 // change (v K + a M(tau) / 4), change the length by which the unit tangent changes, K the kink's deviation a mm/s and
 // M(tau) = E_k[max(0, |t| - tau / 2)^2]. Braking later and holding a lower speed for longer costs way at low speed; braking
 // earlier costs time before: of a few tau the one that loses least time against crossing at full speed is taken, among those
-// that keep the tolerance, the acceleration at the corner, change (v / T1 + a max(0, 1 - tau / T1) / 2), and where tau is
-// below T1, the jerk of a that turns from one tangent to the other.
+// that keep the tolerance, the acceleration at the corner, change (v / T1 + a max(0, 1 - tau / T1) / 2), and the jerk: where tau
+// is below T1 that of a, which turns from one tangent to the other, else the kink's own, change v times the kernel's slope.
 // Units: mm, s. Threads: pure. Cost: a few tens of ns a corner.
 #pragma once
 
@@ -39,6 +39,7 @@ class CornerRule {
   double kink_deviation_s_;
   double acceleration_;
   double jerk_;
+  double kernel_slope_per_s2_ = 0.0;  // its steepest
   std::array<double, kHolds> hold_s_{};
   std::array<double, kHolds> spread_s2_{};  // M
 };
