@@ -47,6 +47,7 @@ nlohmann::json FindingJson(const Finding& f) {
           {"layer", f.layer},
           {"entity", f.entity},
           {"line", f.line},
+          {"dxf_handle", f.dxf_handle},
           {"x_mm", f.at_mm.x()},
           {"y_mm", f.at_mm.y()},
           {"size_mm", f.size_mm},
@@ -63,8 +64,8 @@ void TellFindings(const std::string& file, const std::vector<Finding>& findings,
     }
     const std::string place = file + (f.line > 0 ? ":" + std::to_string(f.line) : "");
     const std::string what = f.entity.empty() ? ""
-                                              : " " + f.entity + " on layer " + f.layer + " at X" +
-                                                    Fixed(f.at_mm.x(), 4) + " Y" + Fixed(f.at_mm.y(), 4);
+                                              : " " + EntityText(f) + " at X" + Fixed(f.at_mm.x(), 4) + " Y" +
+                                                    Fixed(f.at_mm.y(), 4);
     output.Text(place + ": " + std::string(f.reason) + what + ": " + f.message,
                 f.blocks ? Tone::kBad : Tone::kWarning);
   }

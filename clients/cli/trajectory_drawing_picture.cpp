@@ -77,11 +77,17 @@ void DrawCut(PlotFrame& frame, const Cut& cut) {
   flush();
 }
 
-void DrawFindings(PlotFrame& frame, const std::vector<Finding>& findings) {
+Eigen::Vector2d Placed(const trajectory::ContourSet& contours, const Eigen::Vector2d& drawn_mm) {
+  return contours.placed.linear * drawn_mm + contours.placed.offset;
+}
+
+void DrawFindings(PlotFrame& frame, const trajectory::ContourSet& contours,
+                  const std::vector<Finding>& findings) {
   for (const Finding& finding : findings) {
     if (finding.blocks) {
-      frame.Dot(finding.at_mm.x(), finding.at_mm.y(), 6.0, kRed.Faded(0.6));
-      frame.Text(finding.at_mm.x(), finding.at_mm.y(), std::string(finding.reason), kRed, 8.0, -8.0);
+      const Eigen::Vector2d at_mm = Placed(contours, finding.at_mm);
+      frame.Dot(at_mm.x(), at_mm.y(), 6.0, kRed.Faded(0.6));
+      frame.Text(at_mm.x(), at_mm.y(), std::string(finding.reason), kRed, 8.0, -8.0);
     }
   }
 }
@@ -148,7 +154,8 @@ void ChooseDetail(Picture& picture, const trajectory::ContourSet& contours,
   for (const auto* findings : {&contours.findings, &toolpath.findings}) {
     for (const Finding& finding : *findings) {
       if (finding.blocks && !finding.entity.empty()) {
-        DrawDetail(picture, contours, toolpath, finding.at_mm, least_mm, std::string(finding.reason));
+        DrawDetail(picture, contours, toolpath, Placed(contours, finding.at_mm), least_mm,
+                   std::string(finding.reason));
         return;
       }
     }
@@ -202,8 +209,8 @@ absl::Status DrawToolpath(const trajectory::ContourSet& contours, const trajecto
     frame.Dot(cut.pierce().x(), cut.pierce().y(), 2.6, kRed);
     frame.Text(cut.pierce().x(), cut.pierce().y(), std::to_string(++number), kInk, 4.0, -4.0, 11.0);
   }
-  DrawFindings(frame, contours.findings);
-  DrawFindings(frame, toolpath.findings);
+  DrawFindings(frame, contours, contours.findings);
+  DrawFindings(frame, contours, toolpath.findings);
   frame.Legend({{"drawing", kInk},
                 {"path of the jet", kBlue},
                 {"lead-in, pierce", kOrange},

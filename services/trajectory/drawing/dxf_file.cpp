@@ -108,7 +108,17 @@ class DxfReader {
   void Tell(std::string_view reason, std::string entity, std::uint32_t line, std::string message,
             bool blocks = true) {
     drawing_.findings.push_back(
-        {reason, blocks, layer_, std::move(entity), line, at_, 0.0, std::move(message)});
+        {reason, blocks, layer_, std::move(entity), line, at_, 0.0, std::move(message), HandleAt(line)});
+  }
+  // About the whole drawing, so that no option leaves it out.
+  void TellWhole(std::string_view reason, std::uint32_t line, std::string message) {
+    drawing_.findings.push_back({reason, true, "", "", line, {0, 0}, 0.0, std::move(message)});
+    full_ = true;
+  }
+  std::uint64_t HandleAt(std::uint32_t line) const {
+    const auto at = std::lower_bound(guarded_.handles.begin(), guarded_.handles.end(),
+                                     std::pair<std::uint32_t, std::uint64_t>(line, 0));
+    return at != guarded_.handles.end() && at->first == line ? at->second : 0;
   }
   void TellHidden() {
     for (const auto& [layer, count] : hidden_) {
@@ -208,11 +218,10 @@ class DxfReader {
       return;
     }
     curve_count_ += curves_.size();
-    drawing_.entities.push_back({type_, layer_, line_, std::move(curves_)});
+    drawing_.entities.push_back({type_, layer_, line_, std::move(curves_), HandleAt(line_)});
     curves_.clear();
     if (drawing_.entities.size() >= kMostEntities || curve_count_ >= kMostCurves) {
-      Tell("DXF_TOO_LARGE", "", 0, "the drawing has more than 200000 entities or two million curves");
-      full_ = true;
+      TellWhole("DXF_TOO_LARGE", 0, "the drawing has more than 200000 entities or two million curves");
     }
   }
 
@@ -226,7 +235,7 @@ class DxfReader {
     if (farthest_mm > kFarthest_mm) {
       char text[160];
       std::snprintf(text, sizeof text,
-                    "reaches %.3g m from the origin, 1000 m is the most; move the drawing to the origin, or "
+                    "reaches %.4g m from the origin, 1000 m is the most; move the drawing to the origin, or "
                     "mend its unit",
                     farthest_mm / 1e3);
       Tell("ENTITY_TOO_FAR", type_, line_, text);
@@ -288,6 +297,7 @@ class DxfReader {
     if (!InPlane(arc.getExtrusionDir(), map, object)) {
       return;
     }
+    StandAt(object, Exact(center).head<2>());
     const double start = Exact(arc.getStartAngle()) * kDegree_rad;
     double sweep = std::fmod(Exact(arc.getEndAngle()) * kDegree_rad - start, 2.0 * kPi);
     sweep = sweep <= 1e-12 ? sweep + 2.0 * kPi : sweep;
@@ -298,6 +308,7 @@ class DxfReader {
     AffineMap object;
     StandAt(map, Exact(circle.getCenter()).head<2>());
     if (InPlane(circle.getExtrusionDir(), map, object)) {
+      StandAt(object, Exact(circle.getCenter()).head<2>());
       PushArc(object, Exact(circle.getCenter()).head<2>(), Exact(circle.getRadius()), 0.0, 2.0 * kPi);
     }
   }
@@ -358,6 +369,7 @@ class DxfReader {
     if (!InPlane(polyline.getExtrusionDir(), map, object)) {
       return;
     }
+    StandAt(object, n > 0 ? at(0) : Vector2d(Vector2d::Zero()));
     const int edges = n < 2 ? 0 : (polyline.getFlags() & 1) != 0 ? n : n - 1;
     for (int i = 0; i < edges; ++i) {
       dimeParam bulge;
@@ -406,12 +418,14 @@ class DxfReader {
       return Tell("UNKNOWN_BLOCK", type_, line_, "the file has no block of that name");
     }
     if (depth >= kDeepestBlock) {
-      full_ = true;
-      return Tell("BLOCK_TOO_DEEP", type_, line_, "blocks are nested more than 16 deep, or hold themselves");
+      return TellWhole("BLOCK_TOO_DEEP", line_,
+                       "this insertion of block '" + std::string(block->getName()) +
+                           "' is nested more than 16 deep, or the block holds itself");
     }
     if (!InPlane(ExtrusionOf(insert), map, object)) {
       return;
     }
+    StandAt(object, Exact(insert.getInsertionPoint()).head<2>());
     dimeParam param;
     const int columns = insert.getRecord(70, param) ? std::max<int>(1, param.int16_data) : 1;
     const int rows = insert.getRecord(71, param) ? std::max<int>(1, param.int16_data) : 1;
@@ -438,8 +452,7 @@ class DxfReader {
 
   void InsertOnce(dimeBlock& block, const AffineMap& map, const std::string& layer, int depth) {
     if (++insertions_ > kMostEntities) {
-      full_ = true;
-      return Tell("DXF_TOO_LARGE", "", line_, "the drawing makes more than 200000 insertions");
+      return TellWhole("DXF_TOO_LARGE", line_, "the drawing makes more than 200000 insertions");
     }
     for (int i = 0; i < block.getNumEntities() && !full_; ++i) {
       Add(*block.getEntity(i), map, layer, depth + 1);

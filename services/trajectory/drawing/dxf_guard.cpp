@@ -128,14 +128,42 @@ class Guard {
   }
   // Of an entity: told where its block is inserted, or it stands in no block.
   void Tell(const Entity& e, std::string_view reason, std::string message, bool blocks = true) {
+    const int x = e.Find(10) == nullptr ? 11 : 10;  // splines may have fit points only
+    if (!block_.empty()) {
+      message += " (in block " + Quoted(block_) + ", whose own X and Y these are)";
+    }
     inside_[block_].findings.push_back({reason,
                                         blocks,
                                         std::string(e.Text(8).substr(0, kLongestName)),
                                         std::string(e.type.substr(0, 40)),
                                         e.line,
-                                        {Peek(e, 10), Peek(e, 20)},
+                                        {Peek(e, x), Peek(e, x + 10)},
                                         0.0,
-                                        std::move(message)});
+                                        std::move(message),
+                                        HandleOf(e)});
+  }
+  static std::string Quoted(std::string_view text) {
+    return "'" + std::string(text.substr(0, 40)) + (text.size() > 40 ? "…'" : "'");
+  }
+  // 0: none, or none that is a number in hexadecimal digits.
+  static std::uint64_t HandleOf(const Entity& e) {
+    const std::string_view text = e.Text(5);
+    std::uint64_t number = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number, 16);
+    return error == std::errc() && end == text.data() + text.size() ? number : 0;
+  }
+  static std::string MissingText(const Entity& e, int code) {
+    return e.type == "SPLINE" && e.Find(11) != nullptr
+               ? "the spline is drawn by fit points alone; save it with its control points, or as polyline"
+               : "group code " + std::to_string(code) + " is missing";
+  }
+  static std::string UnknownText(const Entity& e) {
+    if (e.type == "VERTEX") {
+      return "VERTEX stands outside a POLYLINE";
+    }
+    const std::string type(e.type.substr(0, 40));
+    return type + " is no contour; turn it into lines and arcs, or leave it out with --ignore-type " + type +
+           " or its layer with --ignore";
   }
   void TellReached(const std::string& first) {
     std::vector<std::string> next = {first};
@@ -377,7 +405,9 @@ class Guard {
   void Block(const Entity& entity) {
     const std::string name = NameOf(entity.Text(2));
     if (!GoodName(name) || !blocks_.insert(name).second) {
-      Refuse(entity.line, "DUPLICATE_BLOCK", "a block needs a name of its own, of at most 255 characters");
+      Refuse(entity.line, "DUPLICATE_BLOCK",
+             GoodName(name) ? "block " + Quoted(name) + " stands twice"
+                            : std::string("a block needs a name, of at most 255 characters"));
       return;
     }
     block_ = name;
@@ -417,7 +447,8 @@ class Guard {
   double RealOf(const Group& group) {
     double value = 0.0;
     if (!Real(group.value, value)) {
-      Refuse(group.line + 1, "BAD_NUMBER", "'" + std::string(group.value.substr(0, 40)) + "' is no number");
+      Refuse(group.line + 1, "BAD_NUMBER",
+             Quoted(group.value) + " is no number; right is one like -12.5, at most 1e9");
     } else if (std::abs(value) > kLargestNumber) {
       Refuse(group.line + 1, "NUMBER_TOO_LARGE", "a number is at most 1e9");
     }
@@ -433,7 +464,7 @@ class Guard {
     int value = missing;
     if (group != nullptr && !Integer(group->value, -32768, 32767, value)) {
       Refuse(group->line + 1, "BAD_NUMBER",
-             "'" + std::string(group->value.substr(0, 40)) + "' is no whole number");
+             Quoted(group->value) + " is no whole number from -32768 to 32767");
     }
     return value;
   }
@@ -461,14 +492,12 @@ class Guard {
     }
     const Keep* keep = KeepOf(entity.type);
     if (keep == nullptr || entity.type == "VERTEX" || entity.type == "BLOCK") {
-      Tell(entity, "UNKNOWN_ENTITY",
-           std::string(entity.type.substr(0, 40)) +
-               " is no contour; explode it, or leave it out with --ignore-type or --ignore");
+      Tell(entity, "UNKNOWN_ENTITY", UnknownText(entity));
       return;
     }
     for (const int code : keep->needed) {
       if (entity.Find(code) == nullptr) {
-        Tell(entity, "MISSING_VALUE", "group code " + std::to_string(code) + " is missing");
+        Tell(entity, "MISSING_VALUE", MissingText(entity, code));
         return SkipFollowers(entity);
       }
     }
@@ -476,7 +505,7 @@ class Guard {
       Insertion(entity);
     }
     if (entity.type == "INSERT" && in_entities_ && !blocks_.contains(NameOf(entity.Text(2)))) {
-      Tell(entity, "UNKNOWN_BLOCK", "no block of that name stands before this insertion");
+      Tell(entity, "UNKNOWN_BLOCK", "no block " + Quoted(entity.Text(2)) + " stands before this insertion");
       return SkipFollowers(entity);
     }
     if (entity.type == "LWPOLYLINE") {
@@ -494,15 +523,16 @@ class Guard {
   void Insertion(const Entity& entity) {
     inside_[block_].insertions.emplace(
         NameOf(entity.Text(2)),
-        Finding{
-            "EXTERNAL_REFERENCE",
-            true,
-            std::string(entity.Text(8).substr(0, kLongestName)),
-            "INSERT",
-            entity.line,
-            {Peek(entity, 10), Peek(entity, 20)},
-            0.0,
-            "the block is another drawing, which this file does not hold; bind it, or send that drawing"});
+        Finding{"EXTERNAL_REFERENCE",
+                true,
+                std::string(entity.Text(8).substr(0, kLongestName)),
+                "INSERT",
+                entity.line,
+                {Peek(entity, 10), Peek(entity, 20)},
+                0.0,
+                "block " + Quoted(entity.Text(2)) +
+                    " is another drawing, which this file does not hold; bind it, or send that drawing",
+                HandleOf(entity)});
   }
 
   // Cut along the middle, which hides that the drawn width is lost.
@@ -525,6 +555,9 @@ class Guard {
     Put(8, GoodName(layer) ? layer : "0");
     if (entity.type != "BLOCK") {
       PutReal(kLineCarrierCode, entity.line);
+      if (const std::uint64_t handle = HandleOf(entity); handle != 0) {
+        result_.handles.emplace_back(entity.line, handle);
+      }
     }
   }
   void Reals(const Entity& entity, const Keep& keep) {
@@ -643,7 +676,8 @@ class Guard {
       }
       if (vertex.Find(10) == nullptr || vertex.Find(20) == nullptr || ++count > kMostVertices) {
         Refuse(vertex.line, count > kMostVertices ? "TOO_MANY_VERTICES" : "MISSING_VALUE",
-               "a vertex needs 10 and 20, a polyline at most 32000 of them");
+               count > kMostVertices ? "a polyline has at most 32000 vertices; split it"
+                                     : "a vertex needs the group codes 10 and 20");
         return;
       }
       lowest = std::min(lowest, Peek(vertex, 30));

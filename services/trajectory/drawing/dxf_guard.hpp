@@ -18,6 +18,7 @@
 #include <map>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "trajectory/core/toolpath/drawing.hpp"
@@ -36,6 +37,8 @@ struct GuardedDxf {
   std::vector<double> numbers;  // real numbers of the text are places in here
   std::vector<Finding> findings;
   std::map<std::string, HiddenLayer> hidden_layers;  // by name in upper case
+  std::vector<std::pair<std::uint32_t, std::uint64_t>>
+      handles;  // of the entities that have one, by rising line
 };
 
 // What Z may differ by in one plane, in the drawing's unit.

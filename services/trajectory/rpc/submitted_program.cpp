@@ -154,10 +154,10 @@ absl::Status CheckFormat(ProgramFormat format, bool has_toolpath) {
 }
 
 ProgramFault FaultOf(const Finding& finding) {
-  const std::string place = finding.entity.empty() ? ""
-                                                   : finding.entity + " on layer " + finding.layer + " at X" +
-                                                         std::to_string(finding.at_mm.x()) + " Y" +
-                                                         std::to_string(finding.at_mm.y()) + ": ";
+  const std::string place = finding.entity.empty()
+                                ? ""
+                                : EntityText(finding) + " at X" + std::to_string(finding.at_mm.x()) + " Y" +
+                                      std::to_string(finding.at_mm.y()) + ": ";
   return {finding.line, 0, finding.reason, finding.entity, place + finding.message};
 }
 

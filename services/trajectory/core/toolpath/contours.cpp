@@ -61,7 +61,9 @@ class ContourFinder {
             0,
             {0.0, 0.0},
             0.0,
-            "the file does not say its unit ($INSUNITS is missing or 0); name it with --units mm or inch"});
+            "the file does not say its unit ($INSUNITS is missing, 0, or no unit of sheets); name it with "
+            "--units "
+            "mm or inch"});
       return std::move(set_);
     }
     for (Finding& f : set_.findings) {  // told in the drawing's unit
@@ -103,11 +105,12 @@ class ContourFinder {
   void Tell(std::string_view reason, bool blocks, std::uint32_t entity, const Vector2d& at_mm, double size_mm,
             std::string message) {
     const DrawingEntity& e = drawing_.entities[entity];
-    Tell({reason, blocks, e.layer, e.type, e.line, at_mm, size_mm, std::move(message)});
+    Tell({reason, blocks, e.layer, e.type, e.line, at_mm, size_mm, std::move(message), e.dxf_handle});
   }
   std::string Name(std::uint32_t entity) const {
     const DrawingEntity& e = drawing_.entities[entity];
-    return e.type + " at line " + std::to_string(e.line) + " (layer " + e.layer + ")";
+    return EntityText({"", true, e.layer, e.type, e.line, {0, 0}, 0.0, "", e.dxf_handle}) + " at line " +
+           std::to_string(e.line);
   }
 
   void Flatten(double unit_mm) {
@@ -145,6 +148,10 @@ class ContourFinder {
     }
   }
 
+  struct End {
+    std::size_t chain;
+    int which;  // 0: begin
+  };
   // Length of each chain that lies on each other chain.
   using Covered = std::map<std::pair<std::size_t, std::size_t>, Overlap>;
   Covered FindOverlaps() {
@@ -186,20 +193,38 @@ class ContourFinder {
     }
     for (const auto& [pair, overlap] : covered) {
       if (pair.first <= pair.second && !chains_[pair.first].dropped && !chains_[pair.second].dropped) {
-        Tell("DUPLICATE_ENTITY", true, chains_[pair.second].entity, overlap.at_mm, overlap.length_mm,
-             "lies on " + Name(chains_[pair.first].entity) + " over " + Mm(overlap.length_mm) +
-                 "; draw that stretch once");
+        TellOverlap(chains_[pair.first], chains_[pair.second], overlap);
       }
     }
     std::erase_if(chains_, [](const Chain& chain) { return chain.dropped; });
   }
 
+  void TellOverlap(const Chain& first, const Chain& second, const Overlap& overlap) {
+    const bool itself = first.entity == second.entity;
+    const double length_mm = itself ? 0.5 * overlap.length_mm : overlap.length_mm;  // found from both sides
+    Tell("DUPLICATE_ENTITY", true, second.entity, overlap.at_mm, length_mm,
+         "lies on " + (itself ? "itself" : Name(first.entity)) + " over " + Mm(length_mm) +
+             "; draw that stretch once");
+    overlapping_[first.entity].insert(second.entity);
+    overlapping_[second.entity].insert(first.entity);
+  }
+  bool Overlapping(std::uint32_t a, std::uint32_t b) const {
+    const auto at = overlapping_.find(a);
+    return at != overlapping_.end() && at->second.contains(b);
+  }
+  // The end of an entity on another that it overlaps: told already.
+  bool EndsOnOverlap(const End& end) const {
+    const auto at = overlapping_.find(chains_[end.chain].entity);
+    return at != overlapping_.end() && std::any_of(chains_.begin(), chains_.end(), [&](const Chain& chain) {
+             return chain.entity != at->first && at->second.contains(chain.entity) &&
+                    std::any_of(chain.pieces.begin(), chain.pieces.end(), [&](const Piece& piece) {
+                      return Distance(piece, Place(end)) <= 10.0 * kSame_mm;
+                    });
+           });
+  }
+
   // ---- joining ----
 
-  struct End {
-    std::size_t chain;
-    int which;  // 0: begin
-  };
   static std::uint64_t Cell(double x, double y) {
     const auto a = static_cast<std::uint64_t>(static_cast<std::int64_t>(std::floor(x)));
     const auto b = static_cast<std::uint64_t>(static_cast<std::int64_t>(std::floor(y)));
@@ -317,7 +342,7 @@ class ContourFinder {
              "the next end, of " + Name(chains_[ends_[near.front()].chain].entity) + ", is " + Mm(gap_mm) +
                  " away; at most " + Mm(options_.gap_mm) + " are joined (--gap-mm)");
       }
-    } else if (!branches || near.empty()) {
+    } else if ((!branches || near.empty()) && !EndsOnOverlap(ends_[i])) {
       Tell("OPEN_CONTOUR", true, entity, Place(ends_[i]), 0.0,
            "no other end lies near; close the contour, or name its layer with --mark or --ignore");
     }
@@ -367,8 +392,10 @@ class ContourFinder {
     }
     const double area_mm2 = SignedArea_mm2(pieces);
     if (pieces.size() < 2 || std::abs(area_mm2) < options_.gap_mm * options_.gap_mm) {
-      Tell("NO_AREA", true, chains_[chain].entity, chains_[chain].end(0), 0.0,
-           "the contour encloses no area");
+      const std::uint32_t entity = chains_[chain].entity;
+      if (!Overlapping(entity, entity)) {
+        Tell("NO_AREA", true, entity, chains_[chain].end(0), 0.0, "the contour encloses no area");
+      }
       return;
     }
     Contour contour;
@@ -393,7 +420,8 @@ class ContourFinder {
     std::map<std::pair<std::size_t, std::size_t>, bool> told;
     for (std::size_t i = 0; i < all.size(); ++i) {
       index.ForNear(BoxOf(all[i]), kSame_mm, [&](std::size_t j) {
-        if (++pairs_ > kMostPairs || j <= i || told[{owner[i], owner[j]}]) {
+        if (++pairs_ > kMostPairs || j <= i || told[{owner[i], owner[j]}] ||
+            Overlapping(all[i].source, all[j].source)) {
           return pairs_ <= kMostPairs;
         }
         const Meetings meetings = Intersect(all[i], all[j], kSame_mm);
@@ -403,7 +431,10 @@ class ContourFinder {
           }
           told[{owner[i], owner[j]}] = true;
           Tell("CROSSING_CONTOURS", true, all[j].source, meetings.meeting[k].at_mm, 0.0,
-               (owner[i] == owner[j] ? "the contour meets itself, in " : "meets ") + Name(all[i].source));
+               all[i].source == all[j].source
+                   ? "meets itself"
+                   : (owner[i] == owner[j] ? "the contour meets itself, in " : "meets ") +
+                         Name(all[i].source));
           break;
         }
         return true;
@@ -460,6 +491,7 @@ class ContourFinder {
   std::vector<End> ends_;
   std::vector<std::size_t> partner_;
   std::set<std::size_t> branched_;
+  std::map<std::uint32_t, std::set<std::uint32_t>> overlapping_;  // entities, both ways
   std::unordered_map<std::uint64_t, std::vector<std::size_t>> cells_;
   double cell_mm_ = 1.0;
   std::size_t pairs_ = 0;

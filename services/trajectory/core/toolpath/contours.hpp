@@ -39,6 +39,7 @@ struct ContourSet {
   std::vector<Pieces> marks;  // open or closed lines to scribe
   std::vector<Finding> findings;
   int part_count = 0;
+  AffineMap placed;  // a turn and a shift, from the drawing, where findings tell their places
 
   bool blocked() const;
 };

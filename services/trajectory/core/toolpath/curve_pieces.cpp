@@ -2,6 +2,7 @@
 // vector form; B-splines by de Boor's algorithm in homogeneous coordinates, tangents from the hodograph's control points.
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <functional>
 #include <numbers>
 
@@ -261,6 +262,17 @@ bool AppendPieces(const Curve& curve, double tolerance_mm, std::uint32_t source,
                                    [](const Piece& piece) { return !(Length(piece) > 1e-9); });
   pieces.erase(gone, pieces.end());
   return followed;
+}
+
+std::string EntityText(const Finding& finding) {
+  if (finding.entity.empty()) {
+    return {};
+  }
+  char digits[24] = "";
+  if (finding.dxf_handle != 0) {
+    std::snprintf(digits, sizeof digits, " %llX", static_cast<unsigned long long>(finding.dxf_handle));
+  }
+  return finding.entity + digits + " on layer " + finding.layer;
 }
 
 }  // namespace lambdajet::trajectory

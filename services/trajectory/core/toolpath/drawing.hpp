@@ -38,8 +38,9 @@ using Curve = std::variant<LineCurve, ConicCurve, SplineCurve>;
 struct DrawingEntity {
   std::string type;  // LINE, LWPOLYLINE, …
   std::string layer;
-  std::uint32_t line = 0;     // of the file, where it begins
-  std::vector<Curve> curves;  // each begins where the one before ends
+  std::uint32_t line = 0;        // of the file, where it begins
+  std::vector<Curve> curves;     // each begins where the one before ends
+  std::uint64_t dxf_handle = 0;  // what CAD programs find it by; 0: none
 };
 
 // Something wrong, or worth knowing, with its place.
@@ -53,7 +54,10 @@ struct Finding {
   Eigen::Vector2d at_mm = Eigen::Vector2d::Zero();
   double size_mm = 0.0;  // gap, overlap, radius that would be right: as the reason says
   std::string message;
+  std::uint64_t dxf_handle = 0;  // 0: none
 };
+// "CIRCLE 2F on layer CUT", the handle in the digits that CAD programs show; empty for the whole file.
+std::string EntityText(const Finding& finding);
 
 struct Drawing {
   double unit_mm = 0.0;  // of the coordinates; 0: the file does not say

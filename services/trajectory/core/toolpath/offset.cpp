@@ -174,7 +174,7 @@ std::vector<OffsetFault> FindGouges(const Pieces& path, const Pieces& contours, 
         const Closeness near = Nearest(path[i], contours[j]);
         if (near.distance_mm < distance_mm - kGouge_mm) {
           told[j] = true;
-          faults.push_back({"KERF_GOUGE", true, i, near.at_mm, near.distance_mm});
+          faults.push_back({"KERF_GOUGE", true, i, near.at_mm, near.distance_mm, j});
         }
       }
       return true;

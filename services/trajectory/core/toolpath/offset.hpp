@@ -23,7 +23,8 @@ struct OffsetFault {
   bool blocks = true;
   std::size_t piece = 0;  // of the input
   Eigen::Vector2d at_mm = Eigen::Vector2d::Zero();
-  double size_mm = 0.0;  // radius or width that would be right; rounded corner: height of what remains
+  double size_mm = 0.0;   // radius or width that would be right; rounded corner: height of what remains
+  std::size_t other = 0;  // gouge: the contours' piece that is cut into
 };
 
 struct OffsetChain {

@@ -119,16 +119,19 @@ class ToolpathMaker {
   void Tell(std::string_view reason, bool blocks, const Piece& piece, const Vector2d& at, double size_mm,
             std::string message) {
     const DrawingEntity& e = drawing_.entities[piece.source];
-    result_.findings.push_back({reason, blocks, e.layer, e.type, e.line, at, size_mm, std::move(message)});
+    const Vector2d drawn_mm = set_.placed.linear.transpose() * (at - set_.placed.offset);
+    result_.findings.push_back(
+        {reason, blocks, e.layer, e.type, e.line, drawn_mm, size_mm, std::move(message), e.dxf_handle});
   }
 
   void AddCut(std::size_t i) {
     const Contour& contour = set_.contours[i];
     const OffsetChain chain = OffsetPieces(contour.pieces, true, contour.hole ? half_mm_ : -half_mm_);
-    TellOffset(contour, chain);
+    TellOffset(contour, chain, true);
     if (chain.blocked() || !ClearOfContours(contour, chain)) {
       return;
     }
+    TellOffset(contour, chain, false);  // what would remain in corners matters once the contour can be cut
     Cut cut;
     cut.kind = contour.hole ? CutKind::kHole : CutKind::kOutline;
     cut.part = contour.part;
@@ -147,9 +150,17 @@ class ToolpathMaker {
     result_.cuts.push_back(std::move(cut));
   }
 
-  void TellOffset(const Contour& contour, const OffsetChain& chain) {
+  void TellOffset(const Contour& contour, const OffsetChain& chain, bool blocks) {
+    const Piece* told = nullptr;  // a circle is two arcs
     for (const OffsetFault& f : chain.faults) {
       const Piece& piece = contour.pieces[f.piece];
+      const bool again = told != nullptr && f.reason == "RADIUS_BELOW_KERF" && told->source == piece.source &&
+                         (told->center_mm - piece.center_mm).norm() <= kTouch_mm &&
+                         std::abs(Radius(*told) - Radius(piece)) <= kTouch_mm;
+      if (f.blocks != blocks || again) {
+        continue;
+      }
+      told = f.reason == "RADIUS_BELOW_KERF" ? &piece : told;
       if (f.reason == "RADIUS_BELOW_KERF") {
         Tell(f.reason, true, piece, f.at_mm, f.size_mm,
              Text("radius %.4g mm is smaller than the jet; right is at least %.4g mm", Radius(piece),
@@ -170,12 +181,37 @@ class ToolpathMaker {
       return true;
     }
     const auto gouges = FindGouges(chain.pieces, all_, index_, half_mm_);
-    for (const OffsetFault& f : gouges) {
+    for (const OffsetFault& f : NearestOfStretches(gouges)) {
       Tell("KERF_GOUGE", true, contour.pieces[chain.pieces[f.piece].source], f.at_mm, f.size_mm,
            Text("here the jet's centre comes within %.4g mm of a contour and cuts into it; it needs %.4g mm",
                 f.size_mm, half_mm_));
     }
     return gouges.empty();
+  }
+
+  bool Touch(std::size_t a, std::size_t b) const {
+    const auto near = [](const Vector2d& p, const Vector2d& q) { return (p - q).norm() <= kTouch_mm; };
+    return near(all_[a].from_mm, all_[b].to_mm) || near(all_[a].to_mm, all_[b].from_mm);
+  }
+  // Where neighbouring pieces of the path come too near to neighbouring pieces of a contour, the nearest place is told for all.
+  std::vector<OffsetFault> NearestOfStretches(const std::vector<OffsetFault>& gouges) const {
+    std::vector<OffsetFault> nearest, last;
+    for (const OffsetFault& f : gouges) {
+      std::size_t k = nearest.size();
+      while (k > 0 && (f.piece > last[k - 1].piece + 1 || !Touch(f.other, last[k - 1].other))) {
+        --k;
+      }
+      if (k == 0) {
+        nearest.push_back(f);
+        last.push_back(f);
+        continue;
+      }
+      last[k - 1] = f;
+      if (f.size_mm < nearest[k - 1].size_mm - kTouch_mm) {
+        nearest[k - 1] = f;
+      }
+    }
+    return nearest;
   }
 
   // ---- leads ----
@@ -428,7 +464,10 @@ void PlaceContours(ContourSet& contours, double turn_rad, const Vector2d& corner
     MovePieces(pieces, turn, Vector2d::Zero());
     box.Add(BoxOf(pieces));
   });
-  each([&](Pieces& pieces) { MovePieces(pieces, Eigen::Matrix2d::Identity(), corner_W_mm - box.low_mm); });
+  const Vector2d shift_mm = corner_W_mm - box.low_mm;
+  each([&](Pieces& pieces) { MovePieces(pieces, Eigen::Matrix2d::Identity(), shift_mm); });
+  contours.placed =
+      AffineMap{Eigen::Matrix2d::Identity(), shift_mm} * AffineMap{turn, Vector2d::Zero()} * contours.placed;
 }
 
 }  // namespace lambdajet::trajectory

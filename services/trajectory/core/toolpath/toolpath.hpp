@@ -7,7 +7,7 @@
 // over the tab's length and one kerf. Outlines of skipped parts are still kept clear of.
 // Frames: W. Units: mm, mm/s, rad. Threads: pure. Cost: n log n in the pieces, and OrderCuts.
 // Errors: findings KERF_GOUGE, RADIUS_BELOW_KERF, NO_ROOM_FOR_LEAD, NO_SUCH_PART; told without blocking: INNER_CORNER_ROUNDED,
-// LEAD_SHORTENED, NO_ROOM_FOR_TAB.
+// LEAD_SHORTENED, NO_ROOM_FOR_TAB. Their places are the drawing's, not those of placed contours.
 #pragma once
 
 #include <string>
