@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 #include <random>
 
 #include "trajectory/core/part_program/gcode_reader.hpp"
@@ -337,6 +338,109 @@ TEST(OrderLaw, IsNeverLongerThanTheDrawingsAndKeepsInnerFirst) {
   }
   RecordProperty("idle_gain_percent", static_cast<int>(100.0 * (1.0 - ordered_mm / drawn_mm)));
   EXPECT_LT(ordered_mm, 0.8 * drawn_mm);
+}
+
+// Idle length of a sequence of single-cut parts from the origin; infinite if a part stands before one in its hole.
+double IdleOf(const std::vector<CutStop>& cuts, const std::vector<std::size_t>& sequence) {
+  std::vector<std::size_t> place(cuts.size() + 1, cuts.size());
+  double length = 0.0;
+  Vector2d at = Vector2d::Zero();
+  for (std::size_t k = 0; k < sequence.size(); ++k) {
+    const CutStop& cut = cuts[sequence[k]];
+    length += (cut.entry_mm - at).norm();
+    at = cut.exit_mm;
+    place[static_cast<std::size_t>(cut.part)] = k;
+  }
+  for (const CutStop& cut : cuts) {
+    const auto part = static_cast<std::size_t>(cut.part),
+               around = static_cast<std::size_t>(cut.enclosing_part);
+    if (around != 0 && place[part] > place[around]) {
+      return 1e300;
+    }
+  }
+  return length;
+}
+
+// Part k in a hole of part k + 1 for every third.
+std::vector<CutStop> RandomParts(Random& random, int count) {
+  std::vector<CutStop> cuts;
+  for (int part = 1; part <= count; ++part) {
+    const Vector2d at(Between(random, 0, 800), Between(random, 0, 600));
+    cuts.push_back({at, at + Vector2d(Between(random, -30, 30), Between(random, -30, 30)), part,
+                    part % 3 == 1 && part < count ? part + 1 : 0, false});
+  }
+  std::shuffle(cuts.begin(), cuts.end(), random);
+  return cuts;
+}
+
+TEST(OrderLaw, ManyNestedPartsKeepInnerFirstAndBeatNearestNeighbour) {
+  Random random(11);
+  for (const int count : {30, 400, 2000}) {
+    const std::vector<CutStop> cuts = RandomParts(random, count);
+    const CutOrder order = OrderCuts(cuts, {0, 0}, true);
+    EXPECT_NEAR(IdleOf(cuts, order.sequence), order.idle_mm, 1e-6);
+    std::vector<std::size_t> sorted = order.sequence, nearest;
+    std::sort(sorted.begin(), sorted.end());
+    std::vector<bool> done(cuts.size() + 1, false);
+    Vector2d at = Vector2d::Zero();
+    while (nearest.size() < cuts.size()) {
+      std::size_t best = cuts.size();
+      for (std::size_t c = 0; c < cuts.size(); ++c) {
+        const bool open = std::none_of(cuts.begin(), cuts.end(), [&](const CutStop& inner) {
+          return inner.enclosing_part == cuts[c].part && !done[static_cast<std::size_t>(inner.part)];
+        });
+        if (!done[static_cast<std::size_t>(cuts[c].part)] && open &&
+            (best == cuts.size() || (cuts[c].entry_mm - at).norm() < (cuts[best].entry_mm - at).norm())) {
+          best = c;
+        }
+      }
+      done[static_cast<std::size_t>(cuts[best].part)] = true;
+      nearest.push_back(best);
+      at = cuts[best].exit_mm;
+    }
+    for (std::size_t k = 0; k < sorted.size(); ++k) {
+      ASSERT_EQ(sorted[k], k);
+    }
+    EXPECT_LE(order.idle_mm, IdleOf(cuts, nearest) + 1e-6);
+  }
+}
+
+TEST(OrderLaw, NoReversalAndNoMoveOfUpToThreeGains) {
+  Random random(12);
+  for (int i = 0; i < 60; ++i) {
+    const std::vector<CutStop> cuts = RandomParts(random, 2 + i % 9);  // all are neighbours of all
+    const CutOrder order = OrderCuts(cuts, {0, 0}, true);
+    const std::size_t n = cuts.size();
+    for (std::size_t a = 0; a < n; ++a) {
+      for (std::size_t b = a + 1; b <= n; ++b) {
+        const auto place = [](auto& list, std::size_t k) { return list.begin() + static_cast<long>(k); };
+        std::vector<std::size_t> trial = order.sequence;
+        std::reverse(place(trial, a), place(trial, b));
+        EXPECT_GE(IdleOf(cuts, trial), order.idle_mm - 1e-6);
+        for (std::size_t m = a + 1; m < b; ++m) {
+          trial = order.sequence;
+          std::rotate(place(trial, a), place(trial, m), place(trial, b));
+          EXPECT_TRUE(std::min(m - a, b - m) > 3 || IdleOf(cuts, trial) >= order.idle_mm - 1e-6);
+        }
+      }
+    }
+  }
+}
+
+TEST(OrderLaw, OfUpToSevenCutsItIsWithinTwoPercentOfTheShortest) {
+  Random random(13);
+  for (int i = 0; i < 60; ++i) {
+    const std::vector<CutStop> cuts = RandomParts(random, 1 + i % 7);
+    std::vector<std::size_t> trial(cuts.size());
+    std::iota(trial.begin(), trial.end(), std::size_t{0});
+    double shortest = 1e300;
+    do {
+      shortest = std::min(shortest, IdleOf(cuts, trial));
+    } while (std::next_permutation(trial.begin(), trial.end()));
+    const double ours = OrderCuts(cuts, {0, 0}, true).idle_mm;
+    EXPECT_GE(ours, shortest - 1e-6);
+    EXPECT_LE(ours, 1.02 * shortest);
+  }
 }
 
 TEST(Toolpath, TabsStandAwayFromCornersAndAsLongAsAsked) {

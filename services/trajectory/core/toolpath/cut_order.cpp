@@ -1,23 +1,16 @@
 #include "trajectory/core/toolpath/cut_order.hpp"
 
 #include <algorithm>
-#include <limits>
 #include <map>
+
+#include "trajectory/core/toolpath/near_points.hpp"
+#include "trajectory/core/toolpath/shorten_path.hpp"
 
 namespace lambdajet::trajectory {
 namespace {
 
 using Eigen::Vector2d;
-constexpr double kGain_mm = 1e-9;
-constexpr int kMostPasses = 60;
-constexpr double kWorkLimit = 2e7;
-constexpr std::size_t kMostImproved = 3000;  // cuts; above, nearest neighbour has to do
-
-struct Stop {
-  Vector2d entry_mm;
-  Vector2d exit_mm;
-};
-
+constexpr int kMostRounds = 8;
 // Length of the idle moves from `before` through the stops to `after`, if there is one.
 double PathLength(const std::vector<Stop>& stops, const std::vector<std::size_t>& sequence,
                   const Vector2d& before, const Vector2d* after) {
@@ -28,57 +21,6 @@ double PathLength(const std::vector<Stop>& stops, const std::vector<std::size_t>
     at = stops[i].exit_mm;
   }
   return after == nullptr ? length : length + (*after - at).norm();
-}
-
-// 2-opt and Or-opt until neither gains; true if anything did.
-template <typename Feasible>
-bool Improve(const std::vector<Stop>& stops, std::vector<std::size_t>& sequence, const Vector2d& before,
-             const Vector2d* after, Feasible feasible) {
-  const std::size_t n = sequence.size();
-  const auto reach = static_cast<std::size_t>(
-      std::max(2.0, kWorkLimit / (1.0 + static_cast<double>(n) * static_cast<double>(n))));
-  if (n > kMostImproved) {
-    return false;
-  }
-  double best = PathLength(stops, sequence, before, after);
-  bool gained = false;
-  std::vector<std::size_t> trial;
-  const auto keep_if_shorter = [&] {
-    const double length = PathLength(stops, trial, before, after);
-    if (length < best - kGain_mm && feasible(trial)) {
-      best = length;
-      sequence = trial;
-      return true;
-    }
-    return false;
-  };
-  for (int pass = 0; pass < kMostPasses; ++pass) {
-    bool better = false;
-    for (std::size_t i = 0; i < n; ++i) {
-      for (std::size_t j = i + 1; j < std::min(n, i + reach); ++j) {
-        trial = sequence;
-        std::reverse(trial.begin() + static_cast<std::ptrdiff_t>(i),
-                     trial.begin() + static_cast<std::ptrdiff_t>(j) + 1);
-        better |= keep_if_shorter();
-        for (std::size_t length = 1; length <= 3 && j + length <= n; ++length) {
-          trial = sequence;  // moves what follows j to i, and what stands at i behind j
-          const auto at = [&](std::size_t k) { return trial.begin() + static_cast<std::ptrdiff_t>(k); };
-          std::rotate(at(i), at(j), at(j + length));
-          better |= keep_if_shorter();
-          if (i + length <= j) {
-            trial = sequence;
-            std::rotate(at(i), at(i + length), at(j + 1));
-            better |= keep_if_shorter();
-          }
-        }
-      }
-    }
-    gained |= better;
-    if (!better) {
-      break;
-    }
-  }
-  return gained;
 }
 
 struct PartCuts {
@@ -107,8 +49,8 @@ class Orderer {
     inner_.resize(parts_.size());
     for (std::size_t p = 0; p < parts_.size(); ++p) {
       const auto at = place.find(parts_[p].enclosing);
-      around_.push_back(at == place.end() ? kNone : at->second);
-      if (around_.back() != kNone) {
+      around_.push_back(at == place.end() ? kNoStop : at->second);
+      if (around_.back() != kNoStop) {
         inner_[around_.back()].push_back(p);
       }
     }
@@ -124,45 +66,56 @@ class Orderer {
   }
 
   std::vector<std::size_t> NearestOrder() {
+    std::vector<Vector2d> entries;
+    std::vector<std::size_t> part_of, open(parts_.size());
+    std::vector<std::vector<std::size_t>> first(parts_.size());
+    for (std::size_t p = 0; p < parts_.size(); ++p) {
+      open[p] = inner_[p].size();
+      for (const std::size_t i : parts_[p].holes.empty() ? parts_[p].outlines : parts_[p].holes) {
+        first[p].push_back(entries.size());
+        entries.push_back(stops_[i].entry_mm);
+        part_of.push_back(p);
+      }
+    }
+    NearPoints near(entries);
+    const auto show = [&](std::size_t p, bool present) {
+      for (const std::size_t k : first[p]) {
+        near.SetPresent(k, present);
+      }
+    };
+    for (std::size_t p = 0; p < parts_.size(); ++p) {
+      show(p, open[p] == 0);
+    }
     std::vector<std::size_t> order;
-    std::vector<bool> done(parts_.size(), false);
     Vector2d at = home_;
     while (order.size() < parts_.size()) {
-      std::size_t best = kNone;
-      double least = std::numeric_limits<double>::infinity();
-      for (std::size_t p = 0; p < parts_.size(); ++p) {
-        if (done[p] || !InnerDone(p, done)) {
-          continue;
-        }
-        const double d = NearestEntry(p, at);
-        if (d < least) {
-          least = d;
-          best = p;
-        }
-      }
-      done[best] = true;
+      const std::size_t best = part_of[near.Nearest(at, 1).front()];
+      show(best, false);
       order.push_back(best);
       at = OrderInside(best, at);
+      if (around_[best] != kNoStop && --open[around_[best]] == 0) {
+        show(around_[best], true);
+      }
     }
     return order;
   }
 
   // Alternates between the order of parts and the order in each until neither gains.
   void Refine(std::vector<std::size_t>& order) {
-    for (int round = 0; round < 8; ++round) {
+    for (int round = 0; round < kMostRounds; ++round) {
       std::vector<Stop> units;
       for (const PartCuts& part : parts_) {
         const std::vector<std::size_t> inside = Inside(part);
         units.push_back({stops_[inside.front()].entry_mm, stops_[inside.back()].exit_mm});
       }
-      bool better =
-          Improve(units, order, home_, nullptr, [this](const auto& trial) { return InnerFirst(trial); });
+      ShortenPath(units, around_, home_, nullptr, order);
+      bool better = false;
       Vector2d at = home_;
       for (const std::size_t p : order) {
         better |= RefineInside(p, at);
         at = stops_[Inside(parts_[p]).back()].exit_mm;
       }
-      if (!better) {
+      if (!better || parts_.size() == 1) {
         return;
       }
     }
@@ -181,8 +134,6 @@ class Orderer {
   }
 
  private:
-  static constexpr std::size_t kNone = static_cast<std::size_t>(-1);
-
   static std::vector<std::size_t> Inside(const PartCuts& part) {
     std::vector<std::size_t> cuts = part.holes;
     cuts.insert(cuts.end(), part.outlines.begin(), part.outlines.end());
@@ -200,50 +151,29 @@ class Orderer {
     order.push_back(p);
   }
 
-  bool InnerDone(std::size_t p, const std::vector<bool>& done) const {
-    return std::all_of(inner_[p].begin(), inner_[p].end(), [&](std::size_t q) { return done[q]; });
-  }
-
-  bool InnerFirst(const std::vector<std::size_t>& order) const {
-    std::vector<std::size_t> place(parts_.size());
-    for (std::size_t k = 0; k < order.size(); ++k) {
-      place[order[k]] = k;
-    }
-    for (std::size_t q = 0; q < parts_.size(); ++q) {
-      if (around_[q] != kNone && place[q] > place[around_[q]]) {
-        return false;
-      }
-    }
-    return true;
-  }
-
-  double NearestEntry(std::size_t p, const Vector2d& at) const {
-    const auto& first = parts_[p].holes.empty() ? parts_[p].outlines : parts_[p].holes;
-    double least = std::numeric_limits<double>::infinity();
-    for (const std::size_t i : first) {
-      least = std::min(least, (stops_[i].entry_mm - at).norm());
-    }
-    return least;
-  }
-
   // Holes by nearest neighbour; returns where the part is left.
   Vector2d OrderInside(std::size_t p, Vector2d at) {
     auto& holes = parts_[p].holes;
-    for (std::size_t k = 0; k < holes.size(); ++k) {
-      const auto next = std::min_element(
-          holes.begin() + static_cast<std::ptrdiff_t>(k), holes.end(), [&](std::size_t a, std::size_t b) {
-            return (stops_[a].entry_mm - at).norm() < (stops_[b].entry_mm - at).norm();
-          });
-      std::iter_swap(holes.begin() + static_cast<std::ptrdiff_t>(k), next);
-      at = stops_[holes[k]].exit_mm;
+    std::vector<Vector2d> entries;
+    for (const std::size_t i : holes) {
+      entries.push_back(stops_[i].entry_mm);
     }
+    NearPoints near(entries);
+    std::vector<std::size_t> ordered;
+    while (ordered.size() < holes.size()) {
+      const std::size_t next = near.Nearest(at, 1).front();
+      near.SetPresent(next, false);
+      ordered.push_back(holes[next]);
+      at = stops_[holes[next]].exit_mm;
+    }
+    holes = std::move(ordered);
     return parts_[p].outlines.empty() ? at : stops_[parts_[p].outlines.back()].exit_mm;
   }
 
   bool RefineInside(std::size_t p, const Vector2d& at) {
     PartCuts& part = parts_[p];
     const Vector2d* after = part.outlines.empty() ? nullptr : &stops_[part.outlines.front()].entry_mm;
-    return Improve(stops_, part.holes, at, after, [](const auto&) { return true; });
+    return ShortenPath(stops_, {}, at, after, part.holes);
   }
 
   Vector2d home_;

@@ -1,11 +1,10 @@
 // Orders cuts for the shortest idle travel, part by part, holes before the outline around them.
 //
 // Model: a travelling salesman's path with precedence: parts in sequence, a part inside another's hole before that part; in a
-// part the holes, then the outline. Nearest neighbour and the drawing's own order are both improved by 2-opt (a stretch
-// reversed) and Or-opt (up to three moved) until neither gains, and the shorter is taken; so the result is never longer than
-// the drawing's order. No random numbers: the same cuts give the same order.
-// Frames: W. Units: mm. Threads: pure. Cost: about n^3 up to some 300 parts;
-// above, only what stands near in the sequence is exchanged; above 3000, nearest neighbour alone.
+// part the holes, then the outline. Nearest neighbour and the drawing's own order are both shortened (`shorten_path`), parts
+// and the holes of each in turn, until neither gains, and the shorter is taken; so the result is never longer than the
+// drawing's order. No random numbers: the same cuts give the same order.
+// Frames: W. Units: mm. Threads: pure. Cost: about n log n.
 #pragma once
 
 #include <Eigen/Core>
