@@ -18,11 +18,11 @@ namespace {
 
 constexpr double kDegreesARadian = 180.0 / std::numbers::pi;
 
-std::filesystem::path Folder() {
+std::filesystem::path GoldenFolder() {
   return std::filesystem::path(std::getenv("LAMBDAJET_SOURCE_DIR")) / "tests/wire/linuxcnc";
 }
 
-std::vector<std::string> Lines(const std::filesystem::path& path) {
+std::vector<std::string> GoldenLines(const std::filesystem::path& path) {
   std::ifstream file(path);
   EXPECT_TRUE(file.good()) << path;
   std::vector<std::string> lines;
@@ -32,21 +32,21 @@ std::vector<std::string> Lines(const std::filesystem::path& path) {
   return lines;
 }
 
-std::string Content(const std::filesystem::path& path) {
+std::string GoldenText(const std::filesystem::path& path) {
   std::ifstream file(path);
   std::stringstream text;
   text << file.rdbuf();
   return text.str();
 }
 
-PartProgram Read(const std::string& text, std::uint8_t axes) {
+PartProgram ReadFor(const std::string& text, std::uint8_t axes) {
   GcodeOptions options;
   options.axes = axes;
   options.kerf_width_mm = 0.8;
   return ReadGcode(text, options);
 }
 
-std::vector<double> EndOf(const Operation& o) {
+std::vector<double> EndInDegrees(const Operation& o) {
   return {o.x_W_mm,
           o.y_W_mm,
           o.z_W_mm,
@@ -56,7 +56,7 @@ std::vector<double> EndOf(const Operation& o) {
 }
 
 // Motions and dwells, without moves that go nowhere: LinuxCNC tells of those, too, and the golden files do not.
-std::vector<Operation> Motions(const PartProgram& program, double nowhere_mm) {
+std::vector<Operation> MotionsOf(const PartProgram& program, double nowhere_mm) {
   std::vector<Operation> kept;
   std::vector<double> at(6, 0.0);
   for (const Operation& o : program.operations) {
@@ -64,7 +64,7 @@ std::vector<Operation> Motions(const PartProgram& program, double nowhere_mm) {
     if (!straight && o.kind != OperationKind::kFeedArc && o.kind != OperationKind::kDwell) {
       continue;
     }
-    const std::vector<double> end = EndOf(o);
+    const std::vector<double> end = EndInDegrees(o);
     double way = 0.0;
     for (std::size_t i = 0; i < end.size(); ++i) {
       way = std::max(way, std::abs(end[i] - at[i]));
@@ -93,7 +93,7 @@ class Golden {
     ASSERT_EQ(kind_, o.kind == OperationKind::kTraverse   ? "TRAVERSE"
                      : o.kind == OperationKind::kFeedLine ? "LINE"
                                                           : "ARC");
-    for (const double coordinate : EndOf(o)) {
+    for (const double coordinate : EndInDegrees(o)) {
       EXPECT_NEAR(coordinate, Number(), to_);
     }
     if (o.kind != OperationKind::kTraverse) {
@@ -123,7 +123,7 @@ class Golden {
     words_ >> written[0] >> written[1] >> written[2] >> plane >> turns;
     EXPECT_EQ(plane, o.plane == ArcPlane::kXy ? "XY" : o.plane == ArcPlane::kZx ? "XZ" : "YZ");
     const std::size_t along = o.plane == ArcPlane::kXy ? 2 : o.plane == ArcPlane::kZx ? 1 : 0;
-    const std::vector<double> end = EndOf(o);
+    const std::vector<double> end = EndInDegrees(o);
     double radius = 0.0;
     for (std::size_t i = 0; i < 3; ++i) {
       radius = i == along ? radius : std::hypot(radius, end[i] - written[i]);
@@ -144,18 +144,18 @@ class Golden {
 
 TEST(LinuxCnc, MakesTheSameMotionsOfAProgram) {
   int programs = 0;
-  for (const auto& entry : std::filesystem::directory_iterator(Folder())) {
+  for (const auto& entry : std::filesystem::directory_iterator(GoldenFolder())) {
     if (entry.path().extension() != ".canon") {
       continue;
     }
     SCOPED_TRACE(entry.path().filename());
-    const std::vector<std::string> golden = Lines(entry.path());
+    const std::vector<std::string> golden = GoldenLines(entry.path());
     const double to = std::stod(golden.at(0).substr(golden[0].rfind(" to ") + 4));
-    const std::string program = Content(std::filesystem::path(entry.path()).replace_extension(".ngc"));
+    const std::string program = GoldenText(std::filesystem::path(entry.path()).replace_extension(".ngc"));
     const bool sheet = entry.path().filename().string().starts_with("xy");
-    const PartProgram read = Read(program, sheet ? kPlanarAxes : kSixAxes);
+    const PartProgram read = ReadFor(program, sheet ? kPlanarAxes : kSixAxes);
     ASSERT_TRUE(read.faults.empty()) << read.faults[0].line << " " << read.faults[0].reason;
-    const std::vector<Operation> motions = Motions(read, 0.51 * to);
+    const std::vector<Operation> motions = MotionsOf(read, 0.51 * to);
     ASSERT_EQ(motions.size() + 1, golden.size());
     for (std::size_t i = 0; i < motions.size(); ++i) {
       SCOPED_TRACE(FormatOperation(motions[i]) + "\n   LinuxCNC " + golden[i + 1]);
@@ -168,7 +168,7 @@ TEST(LinuxCnc, MakesTheSameMotionsOfAProgram) {
 
 // Where the verdicts differ, the table says why.
 TEST(LinuxCnc, AcceptsAndRefusesTheSameLines) {
-  const std::vector<std::string> rows = Lines(Folder() / "lines.tsv");
+  const std::vector<std::string> rows = GoldenLines(GoldenFolder() / "lines.tsv");
   int differ = 0;
   for (std::size_t i = 1; i < rows.size(); ++i) {
     std::istringstream row(rows[i]);
