@@ -202,9 +202,9 @@ TEST_P(HostileLaws, HoldAlongTheBorderOfReach) {
   PlanOptions options;
   options.compensate = GetParam();
   Worst worst;
-  for (const double margin_mm : {20.0, 1.0}) {
+  for (const double margin_mm : {20.0, 1.0, 0.3}) {
     m.singular_margin_mm = margin_mm;
-    for (unsigned seed = 1; seed <= 6; ++seed) {
+    for (const unsigned seed : {1u, 2u, 3u, 35u, 43u, 68u}) {
       SCOPED_TRACE(std::to_string(seed) + " with " + std::to_string(margin_mm) + " mm from singular");
       const std::string text = BorderProgram(m, seed).Make();
       const PlannedProgram planned = PlanPartProgram(text, m, options);
@@ -217,7 +217,7 @@ TEST_P(HostileLaws, HoldAlongTheBorderOfReach) {
       }
     }
   }
-  Tell("border", 12, GetParam(), worst);
+  Tell("border", 18, GetParam(), worst);
 }
 
 // A plan that cuts across such an arc lies near its neighbours all the way.

@@ -1,5 +1,6 @@
 #include "trajectory/core/feed/stretch.hpp"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -18,11 +19,13 @@ namespace {
 using Eigen::Vector2d;
 
 constexpr int kMostPasses = 80;
-constexpr std::size_t kAskEvery = 4096;       // segments between questions whether planning is still wanted
-constexpr int kContourChecks = 8;             // a segment
-constexpr double kToleranceShare = 0.97;      // measured at these, held between them
-constexpr double kPlayedMargin = 1.0 + 1e-5;  // the actuators' quintics make the jet's, nearly
-constexpr double kSettleTimes = 14.0;         // of the damping time: e^-14 of the lead is left
+constexpr std::size_t kAskEvery = 4096;   // segments between questions whether planning is still wanted
+constexpr int kContourChecks = 8;         // a segment
+constexpr double kToleranceShare = 0.97;  // measured at these, held between them
+// The actuators' quintics make the jet's, nearly: both meet at the ends up to the second derivative, and part like the sixth
+// power between, off (4 t (T - t) / T^2)^3. Derivatives of that for off = T = 1, with something for what comes after it.
+constexpr double kPartedSecond = 1.3 * 24.0, kPartedThird = 1.3 * 384.0;
+constexpr double kSettleTimes = 14.0;  // of the damping time: e^-14 of the lead is left
 
 QuinticEnd EndOf(const KnotState& k, int coordinate) {
   return {k.r[coordinate], k.first[coordinate], k.second[coordinate]};
@@ -336,11 +339,28 @@ class StretchPlanner {
       excess.Judge(peaks.third_per_s3 / limit.jerk_mm_per_s3, 1.0 / 3.0, FeedLimit::kActuatorJerk);
     }
     const PathLimits& path = model_.machine.path;
-    const DerivativePeaks peaks = PeaksOf(draft_.played[n], segment.duration_s);
-    excess.Judge(kPlayedMargin * peaks.second_per_s2 / path.acceleration_mm_per_s2, 0.5,
-                 FeedLimit::kPathAcceleration);
-    excess.Judge(kPlayedMargin * peaks.third_per_s3 / path.jerk_mm_per_s3, 1.0 / 3.0, FeedLimit::kPathJerk);
+    const double T = segment.duration_s, parted_mm = Parted_mm(segment, draft_.played[n].value(0.5 * T));
+    const DerivativePeaks peaks = PeaksOf(draft_.played[n], T);
+    excess.Judge((peaks.second_per_s2 + kPartedSecond * parted_mm / (T * T)) / path.acceleration_mm_per_s2,
+                 0.5, FeedLimit::kPathAcceleration);
+    excess.Judge((peaks.third_per_s3 + kPartedThird * parted_mm / (T * T * T)) / path.jerk_mm_per_s3,
+                 1.0 / 3.0, FeedLimit::kPathJerk);
     return excess;
+  }
+
+  // How far the jet that the actuators make is from this place, planned for the segment's middle.
+  double Parted_mm(const Segment& segment, const Vector2d& jet_mm) const {
+    const kinematics::InverseAnswer there = model_.sheet.Position(jet_mm);
+    const kinematics::MotionAnswer x = model_.sheet.Actuators({jet_mm, Vector2d::UnitX(), Vector2d::Zero()});
+    const kinematics::MotionAnswer y = model_.sheet.Actuators({jet_mm, Vector2d::UnitY(), Vector2d::Zero()});
+    if (there.reason != kinematics::Reason::kSolved || !x.differentiable || !y.differentiable) {
+      return 0.0;  // only the ends of segments are known to be reached; they are told elsewhere
+    }
+    Eigen::Matrix2d slopes;
+    slopes << x.motion.velocity_mm_per_s, y.motion.velocity_mm_per_s;
+    const double middle_s = 0.5 * segment.duration_s;
+    const Vector2d played{segment.q_mm[0].value(middle_s), segment.q_mm[1].value(middle_s)};
+    return (slopes.inverse() * (played - there.actuator_position_mm)).norm();
   }
 
   void SlowDown(double widening) {
