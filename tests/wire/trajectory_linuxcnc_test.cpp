@@ -178,9 +178,9 @@ TEST(LinuxCnc, AcceptsAndRefusesTheSameLines) {
     std::getline(row, expected, '\t');
     std::getline(row, why);
     SCOPED_TRACE(line);
-    const PartProgram read =
-        Read("G21 G90 G17\nF1200\nG0 X11 Y20\nG1 X10.5\nG1 X11\n#31=1\n#32=2\n" + line + "\nG1 X20 Y21\nM2\n",
-             kPlanarAxes);
+    const PartProgram read = ReadFor(
+        "G21 G90 G17\nF1200\nG0 X11 Y20\nG1 X10.5\nG1 X11\n#31=1\n#32=2\n" + line + "\nG1 X20 Y21\nM2\n",
+        kPlanarAxes);
     EXPECT_EQ(read.faults.empty() ? "good" : read.faults[0].reason, expected);
     const bool same = (linuxcnc == "good") == (expected == "good");
     EXPECT_EQ(why.empty(), same);
