@@ -2,7 +2,9 @@
 written. Axes "xy" are those of a sheet; "hexapod" adds Z, A, B, other planes, drilling cycles and tool lengths.
 
 Left out is what is read otherwise on purpose (services/trajectory/README.md): kerf compensation, splines, F in a line that changes
-units, G94 without F, turned offsets, drilling with a leaning tool; and a break within a do loop, where LinuxCNC 2.9 leaves both loops."""
+units, G94 without F, turned offsets, drilling with a leaning tool. And what rs274 does unlike the machine it stands for: its machine
+counts in inches (so that parameters of offsets are not read here) and does not convert a tool's length when units change; after
+a break it leaves do loops at their first end."""
 import math
 import random
 
@@ -11,7 +13,7 @@ FUNCTIONS = ("SIN[30]*20", "COS[60]*10", "ATAN[1]/[1]", "SQRT[49]", "ABS[-3.5]",
              "2 EQ 2.0000001", "3 - -2", "2*3**2", "8/2/2", "5 MOD 3*2", "1 OR 0 AND 0")
 STATE = ("x", "y", "z", "a", "feed", "imperial", "incremental", "motion_mode", "plane", "coord_system", "relative",
          "ijk_absolute_mode", "inverse_time", "units_per_minute", "absolute", "metric", "value", "call_level")
-HABITS = ("G21 G90 G17", "G21", "G20 G90", "g90g21g40g49g80", "G21 G90 G94 G64", "G17 G21 G90 G91.1", "G0 G17 G21 G40 G49 G80 G90")
+HABITS = ("{} G90 G17", "{}", "g90{}g40g49g80", "{} G90 G94 G64", "G17 {} G90 G91.1", "G0 G17 {} G40 G49 G80 G90")
 
 
 class Program:
@@ -19,12 +21,14 @@ class Program:
         self.random = random.Random(f"{axes} {seed}")
         self.spatial = axes != "xy"
         self.turns = self.spatial and self.random.random() < 0.4
-        self.lines, self.depth, self.do_loops, self.label, self.subs = [], 0, 0, 100, []
+        self.lines, self.depth, self.label, self.subs = [], 0, 100, []
+        self.units = self.pick((("G21",), ("G21",), ("G20",), ("G21", "G20")))
+        self.breaks = self.random.random() < 0.5  # else do loops
 
     def text(self):
         taped = self.random.random() < 0.1
         self.lines += ["%"] if taped else []
-        self.lines += [self.pick(HABITS), "F1200", "G0 X10 Y20" + (" Z30" if self.spatial else "")]
+        self.lines += [self.pick(HABITS).format(self.units[0]), "F1200", "G0 X10 Y20" + (" Z30" if self.spatial else "")]
         for _ in range(self.random.randint(3, 25)):
             self.statement()
         self.lines.append(self.pick(("M2", "M30")))
@@ -143,7 +147,7 @@ class Program:
                               f"G53 {self.pick(('G0', 'G1'))} {self.place()}")))
 
     def modes(self):
-        self.write(self.pick(("G90", "G90", "G91", "G20", "G21", "G21", "G61", "G64 P0.05", "G64", "G17", "M5", "M9",
+        self.write(self.pick(("G90", "G90", "G91", self.pick(self.units), self.pick(self.units), "G61", "G64 P0.05", "G64", "G17", "M5", "M9",
                               f"F{self.random.randint(10, 9000)}", f"G4 P{abs(self.random.uniform(0, 3)):.3f}",
                               "G90 G54 G64 G40", "G17 G91.1 G1 X5 Y6", "G80 G40 G0 X1")))
 
@@ -157,10 +161,8 @@ class Program:
 
     def setting(self):
         a, b = self.variable(), self.random.randint(31, 36)
-        self.write(self.pick((f"{a}={self.number(-9, 9)}", f"{a} = [#{b}+{self.number(0, 3)}]", f"#[{self.random.randint(31, 33)}+1]=2.5",
-                              f"{a}=#{5420 + self.random.randint(0, 2)}", f"{a}=#5220", f"{a}=#{5221 + self.random.randint(0, 60)}",
-                              f"{a}=#{5210 + self.random.randint(0, 3)}", f"{a}=#{5161 + self.random.randint(0, 1)}",
-                              f"{a}=#<_{self.pick(STATE)}>", f"G1 X{a} Y[#{b}+#31] #31=4 F900", "#33=34 #32=##33")))
+        return self.write(self.pick((f"{a}={self.number(-9, 9)}", f"{a} = [#{b}+{self.number(0, 3)}]", f"#[{self.random.randint(31, 33)}+1]=2.5",
+                              f"{a}=#{5420 + self.random.randint(0, 2)}", f"{a}=#5220", f"{a}=#5210", f"{a}=#<_{self.pick(STATE)}>", f"G1 X{a} Y[#{b}+#31] #31=4 F900", "#33=34 #32=##33")))
 
     def named(self):
         name = self.pick(("a", "len", "my var", "_g", "B2"))
@@ -177,7 +179,7 @@ class Program:
         if self.depth > 2:
             return self.straight()
         label, self.label = self.label, self.label + 1
-        return self.pick((self.branch, self.branch, self.repeat, self.loop, self.loop_at_the_end))(f"{self.pick('oO')}{label}", label)
+        return self.pick((self.branch, self.branch, self.repeat, self.loop, self.loop if self.breaks else self.loop_at_the_end))(f"{self.pick('oO')}{label}", label)
 
     def branch(self, word, _):
         self.lines.append(f"{word} if [{self.variable()} {self.pick(('GT', 'LT', 'EQ', 'NE', 'GE', 'LE'))} {self.random.randint(-3, 5)}]")
@@ -199,7 +201,7 @@ class Program:
         count = f"#{40 + self.depth}"
         self.lines += [f"{count}=0", f"{word} while [{count} lt {self.random.randint(0, 4)}]", f"{count}=[{count}+1]"]
         self.block()
-        if not self.do_loops and self.chance(0.3):
+        if self.breaks and self.chance(0.3):
             self.lines += [f"o{label + 5000} if [{count} eq 2]", f"o{label} {self.pick(('break', 'continue'))}", f"o{label + 5000} endif"]
             self.block(1)
         self.lines.append(f"{word} endwhile")
@@ -207,9 +209,7 @@ class Program:
     def loop_at_the_end(self, word, _):
         count = f"#{40 + self.depth}"
         self.lines += [f"{count}=0", f"{word} do", f"{count}=[{count}+1]"]
-        self.do_loops += 1
         self.block()
-        self.do_loops -= 1
         self.lines.append(f"{word} while [{count} lt {self.random.randint(0, 3)}]")
 
     def call(self):
